@@ -6,12 +6,13 @@
 
 use crate::outcome::RunFailure;
 use io_driver::config::DriverConfig;
+use rt_core::limits;
 use rustix::process::{Pid, Signal, kill_process};
 use shm_abi::client::{self, AttachError, Attachment};
 use std::io::Write;
 use std::os::unix::process::CommandExt;
 use std::path::{Path, PathBuf};
-use std::process::{Child, Command, Stdio};
+use std::process::{Child, Command, ExitStatus, Stdio};
 use std::time::{Duration, Instant};
 use tempfile::TempDir;
 
@@ -37,7 +38,9 @@ impl DriverChild {
     /// # Errors
     /// If the process cannot be started.
     pub fn start(config: &DriverConfig) -> Result<Self, RunFailure> {
-        let failed = |what: &str, error: std::io::Error| RunFailure::Start(format!("cannot {what}: {error}"));
+        let failed = |what: &str, error: std::io::Error| {
+            RunFailure::Start(format!("cannot {what}: {}", limits::with_remedy(&error)))
+        };
         let directory =
             private_directory().map_err(|error| failed("make a directory for the driver's socket", error))?;
         let socket = directory.path().join("driver.sock");
@@ -53,7 +56,9 @@ impl DriverChild {
             // Ctrl-C in a terminal is for the parent, which ends the child in order.
             .process_group(0)
             .spawn()
-            .map_err(|error| failed("start the driver", error))?;
+            .map_err(|error| {
+                RunFailure::Start(format!("cannot start the driver: {}", limits::no_process(&error)))
+            })?;
         if let Some(mut input) = child.stdin.take() {
             // A child that died already says so itself, and `attach` notices.
             let _ = input.write_all(config.to_toml().as_bytes());
@@ -80,12 +85,12 @@ impl DriverChild {
         loop {
             match client::command(&self.socket, name) {
                 Err(AttachError::NoDriver { .. } | AttachError::DriverGone { .. }) => {}
-                other => return Ok(other?),
+                Ok(attachment) => return Ok(attachment),
+                // One that ends while it is asked has said why.
+                Err(error) => return Err(self.end().map_or_else(|| error.into(), did_not_start)),
             }
             if let Ok(Some(status)) = self.child.try_wait() {
-                return Err(RunFailure::Start(format!(
-                    "the driver did not start ({status}); see its message above"
-                )));
+                return Err(did_not_start(status));
             }
             if started.elapsed() > START_LIMIT {
                 return Err(RunFailure::Start(format!(
@@ -97,9 +102,13 @@ impl DriverChild {
     }
 
     /// How it ended, if it has, within a short while.
-    pub fn end(&mut self) -> Option<std::process::ExitStatus> {
+    pub fn end(&mut self) -> Option<ExitStatus> {
         wait_at_most(&mut self.child, Duration::from_millis(500))
     }
+}
+
+fn did_not_start(status: ExitStatus) -> RunFailure {
+    RunFailure::Start(format!("the driver did not start ({status}); see its message above"))
 }
 
 impl Drop for DriverChild {
@@ -114,7 +123,7 @@ impl Drop for DriverChild {
     }
 }
 
-fn wait_at_most(child: &mut Child, limit: Duration) -> Option<std::process::ExitStatus> {
+fn wait_at_most(child: &mut Child, limit: Duration) -> Option<ExitStatus> {
     let started = Instant::now();
     loop {
         match child.try_wait() {

@@ -101,6 +101,8 @@ const LAST_WORDS: Duration = Duration::from_secs(5);
 
 /// Runs the program with the process's own arguments.
 pub fn main() -> ExitCode {
+    // A system that refuses this kills whoever writes too much, as it would anyway.
+    let _ = rt_core::signals::outlive_full_files();
     let ended = execute();
     // The lease is over: nobody is held up but whoever waits for this program.
     say::flush(LAST_WORDS);
@@ -197,8 +199,7 @@ fn play(args: &PlayArgs, settings: &Settings, is_headless: bool) -> Result<(Repo
     }
     let signals = install_signals()?;
     let rig = args.rig(settings)?;
-    args.check_outputs(&rig)?;
-    let mut plan = args.plan(&rig, settings);
+    let mut plan = args.plan(&rig, settings)?;
     plan.window = window_spec(&rig.scene.name, settings)?;
     if plan.window.is_none() {
         return Err(NoWindow::NoDisplay.into());
@@ -212,6 +213,7 @@ fn run_demo(settings: &Settings, is_headless: bool) -> Result<(Report, Stop), Ru
     let record = demo::recording_place(settings.recording_directory.value.as_deref())?;
     let socket = settings.driver_socket.value.clone().unwrap_or_else(|| usual_socket("phantom3"));
     let mut plan = demo::plan(&demo.rig, socket, record);
+    plan.check_outputs(&settings.input_files().collect::<Vec<_>>())?;
     plan.window = if is_headless { None } else { window_spec(&demo.rig.scene.name, settings)? };
     if plan.attach.is_some() {
         demo.rig.layout = calibrated_layout()?;

@@ -69,6 +69,12 @@ pub fn execute(args: &ExportArgs) -> Result<Stop, RunFailure> {
             return tables.finish().1.map(|()| Stop::Finished);
         }
     };
+    if let Err(error) = &end
+        && error.is_of_memory()
+    {
+        // It is not the recording that ends here: half of it would be taken for all.
+        return Err(tables.give_up(error));
+    }
     let (whole, failure) = tables.finish();
     let until_s = run_time_s(last.cast_signed(), recorded.period_ns());
     let part = if end.is_err() { ", up to the damage" } else { "" };

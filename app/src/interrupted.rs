@@ -3,7 +3,7 @@
 //! Model: a thread looks for them, since the one that works may wait for whoever reads a pipe. Results that are not whole
 //! are taken back, which is told; the exit status is 128 and the signal's number.
 
-use crate::outcome::{RunFailure, Stop};
+use crate::outcome::{RunFailure, Stop, no_thread};
 use io_driver::say::say;
 use rt_core::replacement::{Abandoned, abandon_all};
 use rt_core::signals::StopSignals;
@@ -27,7 +27,7 @@ pub(crate) fn watch(signals: StopSignals) -> Result<(), RunFailure> {
         }
     };
     let started = std::thread::Builder::new().name("signals".into()).spawn(watch);
-    started.map(drop).map_err(|error| RunFailure::Start(format!("no thread for signals: {error}")))
+    started.map(drop).map_err(|error| no_thread("to listen for signals", &error))
 }
 
 fn end(signal: i32) -> ! {

@@ -86,6 +86,11 @@ pub enum RunFailure {
     Recording(#[from] RecordingError),
 }
 
+/// Refusal of a run for which a thread could not be started.
+pub fn no_thread(whose: &str, error: &std::io::Error) -> RunFailure {
+    RunFailure::Start(format!("cannot start {whose}: {}", rt_core::limits::no_thread(error)))
+}
+
 impl RunFailure {
     /// The fault behind a word of the frame.
     pub fn driver_fault(word: u64) -> Self {
@@ -101,7 +106,10 @@ impl RunFailure {
             | Self::Segment(_)
             | Self::Device(_)
             | Self::Recording(
-                RecordingError::Create { .. } | RecordingError::Claimed { .. } | RecordingError::Format(_),
+                RecordingError::Create { .. }
+                | RecordingError::NoThread { .. }
+                | RecordingError::Claimed { .. }
+                | RecordingError::Format(_),
             ) => 2,
             _ => 3,
         }

@@ -1,9 +1,12 @@
 //! Output files of a command, checked before anything runs.
 
 use crate::outcome::RunFailure;
-use crate::record::destination::{EventFormat, FormatError, RunFormat, is_same_file, is_same_place, shown};
+use crate::record::destination::{
+    EventFormat, FormatError, RunFormat, is_same_file, is_same_place, place_of, shown,
+};
 use io_driver::print::print_for;
 use rt_core::plain_text::PlainLines;
+use std::ffi::OsStr;
 use std::fmt::Display;
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
@@ -22,6 +25,10 @@ enum Kind {
     Ticks,
     Events,
     Picture,
+    /// A directory of them.
+    Film,
+    /// Named by a stem: an SVG and perhaps a PNG.
+    Chart,
     Scene,
     Model,
     Table,
@@ -43,6 +50,16 @@ impl<'a> Output<'a> {
         Self { option: "--snapshot", file, kind: Kind::Picture }
     }
 
+    /// Of `--frames`.
+    pub(crate) fn film(directory: &'a Path) -> Self {
+        Self { option: "--frames", file: directory, kind: Kind::Film }
+    }
+
+    /// Of a plot, with its ending.
+    pub(crate) fn chart(file: &'a Path) -> Self {
+        Self { option: "the picture", file, kind: Kind::Chart }
+    }
+
     /// Of a scene that is made of others.
     pub(crate) fn scene(file: &'a Path) -> Self {
         Self { option: "--out", file, kind: Kind::Scene }
@@ -62,9 +79,38 @@ impl<'a> Output<'a> {
         match self.kind {
             Kind::Ticks => RunFormat::of(self.file).map(drop),
             Kind::Events => EventFormat::of(self.file).map(drop),
-            Kind::Picture | Kind::Scene | Kind::Model | Kind::Table => Ok(()),
+            Kind::Picture | Kind::Film | Kind::Chart | Kind::Scene | Kind::Model | Kind::Table => Ok(()),
         }
     }
+
+    /// Whether it would be written over this file.
+    fn replaces(&self, other: &Path) -> bool {
+        match self.kind {
+            Kind::Film => is_frame_in(self.file, other),
+            _ => is_same_file(self.file, other),
+        }
+    }
+
+    /// Whether both would be written to the same place.
+    fn meets(&self, other: &Self) -> bool {
+        match (self.kind, other.kind) {
+            (Kind::Film, Kind::Film) => false,
+            (Kind::Film, _) => is_frame_in(self.file, other.file),
+            (_, Kind::Film) => is_frame_in(other.file, self.file),
+            _ => is_same_place(self.file, other.file),
+        }
+    }
+}
+
+/// Whether a film into this directory may have a picture of this name, by whichever links.
+fn is_frame_in(directory: &Path, file: &Path) -> bool {
+    let place = place_of(file);
+    let is_frame = |name: &str| {
+        let number = name.strip_prefix("frame-").and_then(|name| name.strip_suffix(".png"));
+        number.is_some_and(|number| number.len() >= 6 && number.bytes().all(|byte| byte.is_ascii_digit()))
+    };
+    place.file_name().and_then(OsStr::to_str).is_some_and(is_frame)
+        && place.parent() == Some(&place_of(directory))
 }
 
 /// Refuses outputs that would overwrite an input or one another, or whose names say no format.
@@ -75,13 +121,14 @@ pub(crate) fn check(outputs: &[Output<'_>], inputs: &[&PathBuf]) -> Result<(), R
     for (index, output) in outputs.iter().enumerate() {
         let Output { option, file, .. } = output;
         let place = file.display();
-        if let Some(input) = inputs.iter().find(|input| is_same_file(file, input)) {
+        if let Some(input) = inputs.iter().find(|input| output.replaces(input)) {
             let input = input.display();
+            let what = if output.kind == Kind::Film { "directory" } else { "file" };
             return refused(format_args!(
-                "{option} {place} would overwrite the input {input}; name another file"
+                "{option} {place} would overwrite the input {input}; name another {what}"
             ));
         }
-        if let Some(other) = outputs[..index].iter().find(|other| is_same_place(other.file, file)) {
+        if let Some(other) = outputs[..index].iter().find(|other| other.meets(output)) {
             return refused_twice(other, output);
         }
         output.format().or_else(|error| refused(format_args!("{option} {error}")))?;
@@ -90,7 +137,9 @@ pub(crate) fn check(outputs: &[Output<'_>], inputs: &[&PathBuf]) -> Result<(), R
 }
 
 fn refused_twice(first: &Output<'_>, second: &Output<'_>) -> Result<(), RunFailure> {
-    let (place, both) = (second.file.display(), shown(second.file));
+    let place = second.file.display();
+    // That of a film is a directory.
+    let both = shown(if second.kind == Kind::Film { first.file } else { second.file });
     if first.option == second.option {
         let option = second.option;
         return refused(format_args!("{option} {place} is given twice; each needs a file of its own"));

@@ -19,13 +19,19 @@ use thiserror::Error;
 #[derive(Debug, Error)]
 pub enum RecordingError {
     /// The file cannot be made.
-    #[error(
-        "cannot create the recording {file}: {source}; name a file in a directory that exists and can be written"
-    )]
+    #[error("cannot create the recording {file}: {source}; {}", remedy(.source))]
     Create {
         /// Which.
         file: PathBuf,
         /// What the system said.
+        source: io::Error,
+    },
+    /// Nobody could write it.
+    #[error("cannot record into {file}: {}", rt_core::limits::no_thread(.source))]
+    NoThread {
+        /// The file.
+        file: PathBuf,
+        /// The system's error.
         source: io::Error,
     },
     /// Somebody else records into it.
@@ -73,6 +79,11 @@ impl RecordingError {
     }
 }
 
+fn remedy(source: &io::Error) -> String {
+    let known = rt_core::limits::remedy(source);
+    known.unwrap_or_else(|| "name a file in a directory that exists and can be written".into())
+}
+
 /// A recording being written.
 #[derive(Debug)]
 pub struct Recording {
@@ -83,7 +94,7 @@ pub struct Recording {
 }
 
 impl Recording {
-    /// Creates the file, or empties it, and writes the header.
+    /// Creates the file and writes the header; a file that is there keeps its content until the first row.
     ///
     /// # Errors
     /// If the file cannot be made or its first line not be written.
@@ -91,7 +102,7 @@ impl Recording {
         Self::begin(Opened::recording(path)?, names, period_ns)
     }
 
-    /// Empties the file and writes the header; into what may wait for a reader, with what follows.
+    /// Writes the header; into what may wait for a reader or has content, with what follows.
     ///
     /// # Errors
     /// If its first line cannot be written.
@@ -100,6 +111,11 @@ impl Recording {
         let lines = WholeLines::begin(file, &header(&names))
             .map_err(|source| RecordingError::Create { file: path.clone(), source })?;
         Ok(Self { lines, path, names, period_ns })
+    }
+
+    /// Whether the file has its earlier content still.
+    pub fn has_content(&self) -> bool {
+        self.lines.has_content()
     }
 
     /// Where it lies.
@@ -132,7 +148,7 @@ impl Recording {
     /// # Errors
     /// If that fails, or nobody would find it.
     pub fn finish(mut self) -> Result<u64, RecordingError> {
-        self.lines.sync().map_err(|source| self.failed(source))?;
+        self.lines.keep().and_then(|()| self.lines.sync()).map_err(|source| self.failed(source))?;
         let rows = self.lines.rows();
         if self.lines.is_removed() {
             Err(RecordingError::Removed { file: self.path, rows })

@@ -39,7 +39,7 @@ use rt_core::signals::StopSignals;
 use shm_abi::segment::ClockMode;
 use stage::Stage;
 use std::fmt::Display;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use world::events::{Hub, event_queue};
@@ -120,8 +120,10 @@ fn refuse_late_beginning(args: &ReplayArgs, feed: &Feed, stage: &Stage) -> Resul
 }
 
 fn check_outputs(args: &ReplayArgs, rig: &Rig) -> Result<(), RunFailure> {
+    // The recording's own scene is in it, and what is called so here is not read.
+    let of_scene = if args.scene.is_some() { rig.input_files() } else { Vec::new() };
     let inputs: Vec<&PathBuf> =
-        [&args.recording].into_iter().chain(&args.scene).chain(rig.model_files()).collect();
+        [&args.recording].into_iter().chain(&of_scene).chain(rig.model_files()).collect();
     outputs::check(&args.record.iter().map(|file| Output::ticks(file)).collect::<Vec<_>>(), &inputs)
 }
 
@@ -185,14 +187,12 @@ impl Play {
         if let Some(taken) = taken {
             fast = fast.with_control(taken);
         }
-        // The last: it empties files, and nothing may refuse the replay after that.
+        // The last: it makes files. Those with content are emptied by their first rows.
         let create =
             |_, file| record::create(file, names.clone(), period_ns, &stage.about, &view, (&book, 0));
         let begun = record::begin_all(&records.iter().collect::<Vec<_>>(), create)?;
-        let start = |(path, file): (&PathBuf, _)| {
-            Recorder::start(path, file, bodies, period_ns, WhenFull::Wait.into())
-        };
-        let mut recorders = records.iter().zip(begun).map(start).collect::<Result<Vec<_>, _>>()?;
+        let start = |path: &Path, file| Recorder::start(path, file, bodies, period_ns, WhenFull::Wait.into());
+        let mut recorders = Recorder::start_all(records.iter().zip(begun), start)?;
         slow::subscribe(&mut recorders, &mut hub);
         Ok(Self {
             driver,

@@ -154,12 +154,17 @@ impl fmt::Display for Report {
 
 /// What became of a recording, of a run that could not hand on so many rows.
 pub(crate) fn recording_line(recorded: &Recorded, rows_lost: u64) -> String {
-    let Recorded { path, rows, unit, lost, failure } = recorded;
+    let Recorded { path, rows, unit, lost, failure, is_as_before } = recorded;
     let who = if is_standard_output(path) { "its reader" } else { "the disk" };
     let lost = match lost + rows_lost {
         0 => String::new(),
         lost => format!(", {lost} LOST: {who} was too slow"),
     };
     let end = if failure.is_some() { " NOT COMPLETE: see the message above" } else { "" };
+    let end = if failure.is_none() && *is_as_before {
+        ": there was no tick, and the file is as it was"
+    } else {
+        end
+    };
     format!("recording    {} ({rows} {unit}{lost}){end}", Plain(shown(path).display()))
 }

@@ -158,10 +158,12 @@ impl Rig {
     /// The first thing that is wrong with it.
     pub fn beside(&self, scene_file: &Path, settings: &Settings) -> Result<Self, RigError> {
         let scene_file = &settings::find(scene_file, &settings.scenes.value);
-        let mut scene = Scene { hand: None, ..Scene::load(scene_file)? };
+        let mut scene = Scene::load(scene_file)?;
         settings::find_data(&mut scene, scene_file, settings);
-        let rig =
+        let its_hand = scene.hand.take();
+        let mut rig =
             Self::new(scene_file, scene, self.layout.clone(), None, HandMode::Kinematic, self.period_ns)?;
+        rig.scene.hand = its_hand;
         let (bases, hand_mode, hand) = (self.bases.clone(), self.hand_mode.clone(), self.hand.clone());
         Ok(Self { bases, hand_mode, hand, ..rig })
     }
@@ -270,6 +272,17 @@ impl Rig {
             _ => None,
         });
         models.chain(self.scene.entities.iter().filter_map(|entity| Some(&entity.height_map.as_ref()?.file)))
+    }
+
+    /// All files that it consists of, also those that this run does not read: nothing is written into them.
+    pub fn input_files(&self) -> Vec<PathBuf> {
+        let devices = match &self.hand_mode {
+            HandMode::Impedance(devices) => vec![&devices.description, &devices.hand_model],
+            HandMode::Kinematic => Vec::new(),
+        };
+        let hands = self.hand.iter().map(|hand| &hand.path).chain(&self.scene.hand);
+        let scenes = [&self.scene_file].into_iter().chain(&self.scene.included);
+        scenes.chain(hands).chain(devices).chain(self.model_files()).cloned().collect()
     }
 
     fn refused(&self, line: Option<usize>, what: String, source: ParameterError) -> RigError {

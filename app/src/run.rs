@@ -10,7 +10,8 @@ use crate::live::LiveHandFile;
 use crate::moments::Moments;
 use crate::not_zeroed;
 use crate::on_request::OnRequest;
-use crate::outcome::{RunFailure, Stop};
+use crate::outcome::{RunFailure, Stop, no_thread};
+use crate::outputs::{self, Output};
 use crate::premises::Premises;
 use crate::progress::Progress;
 use crate::record::{About, Files, Recorded, View};
@@ -69,6 +70,23 @@ pub struct RunPlan {
     pub attach: Option<Attach>,
 }
 
+impl RunPlan {
+    /// Refuses outputs that would take the place of one of these files or of one another, or whose names say no format.
+    ///
+    /// # Errors
+    /// The first that is wrong, and what to do.
+    pub fn check_outputs(&self, inputs: &[PathBuf]) -> Result<(), RunFailure> {
+        let ticks = self.record.iter().map(|file| Output::ticks(file));
+        let events = self.events.iter().map(|file| Output::events(file));
+        let pictures = self.pictures.iter().flat_map(|wanted| &wanted.shots);
+        let pictures = pictures.map(|shot| Output::picture(&shot.file));
+        let film = self.pictures.iter().filter_map(|wanted| wanted.film.as_ref());
+        let film = film.map(|film| Output::film(&film.directory));
+        let outputs: Vec<_> = ticks.chain(events).chain(pictures).chain(film).collect();
+        outputs::check(&outputs, &inputs.iter().collect::<Vec<_>>())
+    }
+}
+
 /// A driver that runs already.
 #[derive(Debug, Clone)]
 pub struct Attach {
@@ -85,7 +103,7 @@ pub struct Attach {
 pub fn run(rig: &Rig, plan: &RunPlan, signals: &StopSignals) -> Result<(Report, Stop), RunFailure> {
     // A terminal held by Ctrl-S holds no run, and no lease.
     let thread = log_thread::start("phantom3");
-    thread.map_err(|error| RunFailure::Start(format!("cannot start the log's thread: {error}")))?;
+    thread.map_err(|error| no_thread("the log", &error))?;
     match plan.clock {
         Some(ClockMode::Virtual) => run_virtual(rig, plan, signals),
         _ => run_two_processes(rig, plan, signals),
@@ -156,6 +174,8 @@ impl Parts {
         .transpose()
         .map_err(RunFailure::Start)?
         .unzip();
+        let others = desk.as_ref().map(Desk::scenes_to_come).unwrap_or_default();
+        plan.check_outputs(&others)?;
         let (producer, consumer) = row_queue(step.bodies().len());
         let pictures = plan.pictures.iter().flat_map(|wanted| &wanted.shots).map(|shot| &shot.file);
         let files = Files {
@@ -166,14 +186,14 @@ impl Parts {
             backpressure: when_full.into(),
             book,
             about: about.clone(),
-            taken: plan.inputs.iter().chain(pictures).cloned().collect(),
+            taken: plan.inputs.iter().chain(&others).chain(pictures).cloned().collect(),
         };
         let snapshots = plan
             .pictures
             .as_ref()
             .map(|wanted| Snapshots::start(wanted, shown(), period_ns, when_full == WhenFull::Wait));
         let snapshots = snapshots.transpose().map_err(RunFailure::Start)?;
-        // The last: it empties files, and nothing may refuse the run after that.
+        // The last: it makes files. Those with content are emptied by their first rows, once all threads are there.
         let recorders = files.first(rig, &view)?;
         let fast = FastLoop::new(step, producer, when_full, total_ticks, period_ns).with_events(events);
         Ok(Self {
@@ -265,6 +285,12 @@ fn run_two_processes(rig: &Rig, plan: &RunPlan, signals: &StopSignals) -> Result
     let known = (&premises, &mut totals);
     let result = two_processes::run(&mut source, attachment, (fast, slow_lists), known, watched);
     progress.end();
+    if slow.newest.is_none()
+        && let Err(failure @ RunFailure::Start(_)) = result
+    {
+        slow.take_back();
+        return Err(failure);
+    }
     let SlowEnd { recordings, events, pictures } = slow.finish();
     let end = result.inspect_err(|_| tell_kept(&recordings))?;
     let is_real = info.clock_mode == ClockMode::Real;

@@ -264,10 +264,22 @@ impl SlowSide {
                 say(format_args!("phantom3: {error}"));
                 let path = files.record[0].clone();
                 let failure = Some(error.to_string());
-                self.failed.push(Recorded { path, rows: 0, unit: "rows", lost: 0, failure });
+                self.failed.push(Recorded {
+                    path,
+                    rows: 0,
+                    unit: "rows",
+                    lost: 0,
+                    failure,
+                    is_as_before: false,
+                });
                 Vec::new()
             }
         }
+    }
+
+    /// Of a run that did not begin: its files are as they were.
+    pub fn take_back(self) {
+        self.recorders.into_iter().for_each(Recorder::take_back);
     }
 
     /// Takes the rest, and closes the recordings.

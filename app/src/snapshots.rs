@@ -19,6 +19,7 @@ use crate::record::backpressure::{Progress, STUCK, Wait};
 use crate::row::{BodyRow, Row};
 use crate::shown::Shown;
 use io_driver::say::say;
+use rt_core::limits;
 use std::collections::VecDeque;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -81,7 +82,7 @@ pub struct Drawn {
     pub missing: u64,
     /// What went wrong, which has been told.
     pub failure: Option<String>,
-    /// Whether that is a file that could not be written, rather than a machine that cannot draw.
+    /// Whether that is a file that could not be written, or a limit, rather than a machine that cannot draw.
     pub is_fault: bool,
 }
 
@@ -147,7 +148,7 @@ impl Snapshots {
         let thread = std::thread::Builder::new()
             .name("pictures".into())
             .spawn(move || draw(to_draw, &told.0, &told.1))
-            .map_err(|error| format!("no thread for pictures: {error}"))?;
+            .map_err(|error| format!("cannot draw pictures: {}", limits::no_thread(&error)))?;
         let mut shots = wanted.shots.clone();
         shots.sort_by(|a, b| a.t_s.total_cmp(&b.t_s));
         Ok(Self {
@@ -306,12 +307,15 @@ struct Drawer {
 }
 
 impl Drawer {
-    fn new(stage: &Stage, wanted: &Wanted) -> Result<Self, String> {
+    /// Or what is missing, and whether a machine that can draw is kept from it.
+    fn new(stage: &Stage, wanted: &Wanted) -> Result<Self, (String, bool)> {
         for line in &stage.not_drawn {
             say(format_args!("phantom3: not in pictures: {line}"));
         }
-        let camera = camera_of(stage, wanted.camera.as_deref()).or_else(|_| camera_of(stage, None))?;
-        let studio = Studio::new(stage, wanted.size).map_err(|missing| missing.to_string())?;
+        let camera = camera_of(stage, wanted.camera.as_deref()).or_else(|_| camera_of(stage, None));
+        let camera = camera.map_err(|missing| (missing, false))?;
+        let studio = Studio::new(stage, wanted.size);
+        let studio = studio.map_err(|missing| (missing.to_string(), missing.is_of_a_limit()))?;
         Ok(Self { studio, camera, eyes: wanted.eyes })
     }
 }
@@ -335,9 +339,9 @@ fn draw_all(
                     drawer = Some(made);
                     steps.take();
                 }
-                Err(missing) => {
+                Err((missing, is_fault)) => {
                     say(format_args!("phantom3: {missing}"));
-                    drawn.failure = Some(missing);
+                    (drawn.failure, drawn.is_fault) = (Some(missing), is_fault);
                     // Nobody is to wait for room.
                     work.iter().for_each(drop);
                     return drawn;

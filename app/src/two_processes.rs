@@ -13,7 +13,7 @@ use crate::fast_loop::{FastLoop, Tally};
 use crate::fast_thread::{self, FastEnd, FastRemains, FastShared};
 use crate::lists_end::ListsEnd;
 use crate::not_zeroed;
-use crate::outcome::{RunFailure, Stop};
+use crate::outcome::{RunFailure, Stop, no_thread};
 use crate::premises::{OtherDriver, Premises};
 use crate::progress::Progress;
 use crate::slow::SlowSide;
@@ -162,9 +162,7 @@ fn start_slow_list(
     }
     let later = later.unwrap_or_else(|| mpsc::channel().1);
     let started = SlowThread::start_with(first, later, Arc::clone(run_ticks), info.period_ns);
-    started
-        .map(Some)
-        .map_err(|error| RunFailure::Start(format!("cannot start the slow list's thread: {error}")))
+    started.map(Some).map_err(|error| no_thread("the slow list", &error))
 }
 
 /// Why watching ended.
@@ -194,7 +192,7 @@ fn run_attached(
         say(format_args!("phantom3: {warning}"));
     }
     let (report, thread) = fast_thread::start(fast, driver, commander, shared.clone())
-        .map_err(|error| RunFailure::Start(format!("cannot start the fast thread: {error}")))?;
+        .map_err(|error| no_thread("the fast loop", &error))?;
     let end = loop {
         slow.step();
         if thread.is_finished() || shared.is_over.load(Ordering::Acquire) {

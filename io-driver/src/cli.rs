@@ -126,6 +126,8 @@ pub fn execute(command: DriverCommand) -> ExitCode {
 }
 
 fn execute_with(command: DriverCommand, fit: Option<Fit>) -> ExitCode {
+    // A system that refuses this kills whoever writes too much, as it would anyway.
+    let _ = rt_core::signals::outlive_full_files();
     let code = perform(command, fit);
     // A result that nobody got is none.
     if print::is_lost() && code == ExitCode::SUCCESS { ExitCode::from(EXIT_FAULT) } else { code }

@@ -29,6 +29,7 @@ use shm_abi::segment::{ClockMode, DriverInfo, SegmentError};
 use shm_abi::server::{BindError, Server};
 use shm_abi::stop_socket::StopSocket;
 use std::io;
+use std::os::fd::AsFd;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::AtomicU64;
@@ -80,8 +81,16 @@ pub enum RunError {
     /// `--strict`, and something is missing.
     #[error("--strict: not every real-time guarantee was obtained, so nothing was started:\n{}", .0.to_string().trim_end())]
     Strict(SetupReport),
+    /// A thread is missing.
+    #[error("cannot {what}: {}", rt_core::limits::no_thread(.source))]
+    NoThread {
+        /// What it was to do.
+        what: &'static str,
+        /// The system's error.
+        source: io::Error,
+    },
     /// The system refused something.
-    #[error("cannot {what}: {source}")]
+    #[error("cannot {what}: {}", rt_core::limits::with_remedy(.source))]
     System {
         /// What was tried.
         what: &'static str,
@@ -161,12 +170,13 @@ pub fn run(config: &DriverConfig, options: &RunOptions) -> Result<(), RunError> 
     let rights = config.access.resolve().map_err(RunError::Access)?;
     let server = Server::bind_for(&path, rights)?;
     // The last threads: the sandbox lets none be started.
-    let system = |what| move |source| RunError::System { what, source };
+    let no_thread = |what| move |source| RunError::NoThread { what, source };
     let (stop_socket, stop_file) = StopSocket::bind(server.path())?;
     stop_thread::start(stop_socket, sender.urgent.clone(), options.quiet)
-        .map_err(system("start the thread that stops"))?;
+        .map_err(no_thread("listen for stops"))?;
     let lost = drain.lost_count();
-    log_thread::start_for_driver(drain, options.quiet).map_err(system("start the log's thread"))?;
+    log_thread::start_for_driver(drain, options.quiet).map_err(no_thread("start the log"))?;
+    refuse_without_descriptors()?;
     report.guarantees.push(sandbox::shut(&config.process));
     memory.tell_setup_report(&report.to_string());
     refuse_if_strict(&report, options)?;
@@ -246,6 +256,19 @@ fn give_up_rights(
     }
     Ok(sandbox::give_up_rights(user, report, |keep| starter.give_up_rights(keep))?)
 }
+
+/// An application that finds none left would wait for an answer, and not be told why.
+fn refuse_without_descriptors() -> Result<(), RunError> {
+    let any = io::stderr();
+    let spare =
+        (0..SPARE_DESCRIPTORS).map(|_| any.as_fd().try_clone_to_owned()).collect::<io::Result<Vec<_>>>();
+    let what = "keep descriptors for an application";
+    spare.map(drop).map_err(|source| RunError::System { what, source })
+}
+
+/// Its connection and its process, its segment, two for the pipe that holds the segment's pages, one to map it by; and two
+/// for somebody who looks on meanwhile.
+const SPARE_DESCRIPTORS: usize = 8;
 
 fn refuse_if_strict(report: &SetupReport, options: &RunOptions) -> Result<(), RunError> {
     if options.strict && !report.all_obtained() {

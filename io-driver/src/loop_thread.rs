@@ -112,7 +112,7 @@ pub(crate) fn spawn(config: &DriverConfig, shared: &Shared) -> Result<(SetupRepo
     let thread = std::thread::Builder::new()
         .name("driver-loop".into())
         .spawn(body)
-        .map_err(|source| RunError::System { what: "start the loop's thread", source })?;
+        .map_err(|source| RunError::NoThread { what: "start the loop", source })?;
     let (report, spin_margin_ns) =
         receive_report.recv().map_err(|_| RunError::Panicked("during its set-up".into()))?;
     Ok((report, spin_margin_ns, Starter { send, thread }))

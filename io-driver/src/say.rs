@@ -14,7 +14,7 @@ use std::fmt;
 use std::io::Write;
 use std::sync::OnceLock;
 use std::sync::atomic::{AtomicU64, Ordering};
-use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
+use std::sync::mpsc::{Receiver, SyncSender, TrySendError, sync_channel};
 use std::time::{Duration, Instant};
 
 /// Lines that may wait for standard error.
@@ -46,11 +46,14 @@ pub fn say(line: fmt::Arguments<'_>) {
     let line = indented(line);
     match QUEUE.get() {
         None => write(&line),
-        Some(queue) => {
-            if queue.entries.try_send(Entry::Line(line)).is_err() {
+        Some(queue) => match queue.entries.try_send(Entry::Line(line)) {
+            Ok(()) => {}
+            // The log's thread could not be started: why is what is to be told.
+            Err(TrySendError::Disconnected(Entry::Line(line))) => write(&line),
+            Err(_) => {
                 queue.dropped.fetch_add(1, Ordering::Relaxed);
             }
-        }
+        },
     }
 }
 
@@ -87,8 +90,8 @@ pub fn flush(patience: Duration) -> bool {
     let (send_done, done) = sync_channel(0);
     let mut entry = Entry::Flush(send_done);
     while let Err(refused) = queue.entries.try_send(entry) {
-        let (std::sync::mpsc::TrySendError::Full(back) | std::sync::mpsc::TrySendError::Disconnected(back)) =
-            refused;
+        // Without the log's thread everything is written when it is said.
+        let TrySendError::Full(back) = refused else { return true };
         if Instant::now() >= until {
             return false;
         }

@@ -8,6 +8,7 @@
 //! Invariant: memory is at most the bound, and is asked for as bytes arrive.
 
 use crate::file_kind;
+use nix::fcntl::{FcntlArg, OFlag, fcntl};
 use std::fs::{File, FileType, Metadata, OpenOptions};
 use std::io::{self, ErrorKind, Read};
 use std::os::unix::fs::{FileTypeExt, OpenOptionsExt};
@@ -22,6 +23,30 @@ pub fn open(path: &Path) -> io::Result<File> {
     let file = OpenOptions::new().read(true).custom_flags(libc::O_NONBLOCK | libc::O_NOCTTY).open(path)?;
     check(&file.metadata()?)?;
     Ok(file)
+}
+
+/// Opens whatever can be read to its end: a regular file, or a pipe that somebody writes.
+///
+/// # Errors
+/// The system's error; a pipe that nobody writes, for which reading would wait for ever.
+pub fn open_stream(path: &Path) -> io::Result<impl Read> {
+    let found = path.metadata()?;
+    if found.is_dir() {
+        return Err(no_regular_file(found.file_type()));
+    }
+    let mut file =
+        OpenOptions::new().read(true).custom_flags(libc::O_NONBLOCK | libc::O_NOCTTY).open(path)?;
+    let mut begin = [0];
+    let read = match file.read(&mut begin) {
+        Err(error) if error.kind() == ErrorKind::WouldBlock => 0,
+        Ok(0) if file.metadata()?.file_type().is_fifo() => {
+            return Err(io::Error::other("nobody writes this pipe; start its writer first, or name a file"));
+        }
+        read => read?,
+    };
+    let flags = OFlag::from_bits_retain(fcntl(&file, FcntlArg::F_GETFL)?);
+    fcntl(&file, FcntlArg::F_SETFL(flags - OFlag::O_NONBLOCK))?;
+    Ok(io::Cursor::new(begin).take(read as u64).chain(file))
 }
 
 /// The content of a regular file.
@@ -96,8 +121,11 @@ fn check(found: &Metadata) -> io::Result<()> {
     if found.is_file() {
         return Ok(());
     }
-    let said = format!("it is {}, no regular file", kind(found.file_type()));
-    Err(io::Error::new(ErrorKind::InvalidInput, said))
+    Err(no_regular_file(found.file_type()))
+}
+
+fn no_regular_file(found: FileType) -> io::Error {
+    io::Error::new(ErrorKind::InvalidInput, format!("it is {}, no regular file", kind(found)))
 }
 
 fn kind(found: FileType) -> &'static str {
@@ -195,6 +223,25 @@ mod tests {
             assert_eq!(refused.kind(), ErrorKind::InvalidInput, "{}", path.display());
             assert_eq!(refused.to_string(), format!("it is {found}, no regular file"));
         }
+    }
+
+    #[test]
+    fn a_pipe_is_read_to_its_end_if_somebody_writes_it_and_refused_at_once_if_nobody_does() {
+        use std::io::Write;
+        let place = Place::new("stream");
+        let pipe = place.0.join("pipe");
+        nix::unistd::mkfifo(&pipe, nix::sys::stat::Mode::S_IRWXU).expect("a pipe");
+        let refused = open_stream(&pipe).map(drop).expect_err("nobody writes it").to_string();
+        assert!(refused.contains("nobody writes this pipe"), "{refused}");
+        let both = File::options().read(true).write(true).open(&pipe).expect("our own");
+        let mut writer = File::options().write(true).open(&pipe).expect("it has a reader");
+        let silent = open_stream(&pipe).expect("a writer who has written nothing yet");
+        writer.write_all(b"abc").expect("room");
+        drop(writer);
+        drop(both);
+        assert_eq!(read_all(silent, 9).expect("all of it"), b"abc");
+        assert_eq!(read_all(open_stream(&place.write(b"abc")).expect("a file"), 9).expect("all"), b"abc");
+        assert!(open_stream(&place.0).is_err(), "a directory");
     }
 
     #[test]

@@ -17,7 +17,8 @@
 //! show that a loop does not allocate.
 //! [`input_file`] reads files that others name, [`output_file`] opens those to be written, [`replacement`] has them
 //! take their places when they are whole, [`separators`] and [`toml_slips`] know what is usually wrong
-//! in tables and in TOML, [`likeness`] which word was meant, and [`plain_text`] keeps foreign text from acting on a terminal.
+//! in tables and in TOML, [`likeness`] which word was meant, [`limits`] what to do where the system has no more to give,
+//! and [`plain_text`] keeps foreign text from acting on a terminal.
 //! [`doctor`] says whether the machine is ready for any of this, [`read_back`] what root has set for it, and
 //! [`installed`] names what a laboratory's installation consists of.
 //!
@@ -39,6 +40,7 @@ pub mod input_file;
 pub mod installed;
 pub mod last_act;
 pub mod likeness;
+pub mod limits;
 pub mod log;
 pub mod output_file;
 pub mod periodic;

@@ -52,6 +52,15 @@ fn stop_signals() -> SigSet {
     [Signal::SIGTERM, Signal::SIGINT, Signal::SIGHUP].into_iter().collect()
 }
 
+/// Catches SIGXFSZ, so that a file which may not grow any more is a failed write, as a full disk is. For the beginning of a
+/// program: whatever it does may write.
+///
+/// # Errors
+/// Errors of sigaction(2).
+pub fn outlive_full_files() -> io::Result<()> {
+    flag::register(SIGXFSZ, Arc::new(AtomicBool::new(false))).map(drop)
+}
+
 /// Whether this process was asked to stop; by default nothing asks.
 #[derive(Clone, Debug, Default)]
 pub struct StopSignals {
@@ -86,8 +95,7 @@ impl StopSignals {
         for number in numbers {
             flag::register_usize(number, Arc::clone(&signal), number as usize)?;
         }
-        // Caught, so that a file that may not grow any more is a failed write, as a full disk is.
-        flag::register(SIGXFSZ, Arc::new(AtomicBool::new(false)))?;
+        outlive_full_files()?;
         Ok(Self { signal })
     }
 

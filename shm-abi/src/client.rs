@@ -5,7 +5,7 @@
 
 use crate::handshake::{self, Answer, Request, RequestKind, Verdict};
 use crate::layout::{LAYOUT_HASH, MAGIC};
-use crate::segment::{CommanderMemory, DriverView, SegmentError};
+use crate::segment::{self, CommanderMemory, DriverView, SegmentError};
 use crate::socket;
 use crate::stop_socket;
 use rustix::net::sockopt::{Timeout, set_socket_timeout};
@@ -171,7 +171,7 @@ pub enum AttachError {
     #[error(transparent)]
     Segment(#[from] SegmentError),
     /// The system refused something else.
-    #[error("cannot {what} at {socket}: {source}")]
+    #[error("cannot {what} at {socket}: {source}{}", segment::remedy(.source))]
     System {
         /// What was tried.
         what: &'static str,

@@ -22,6 +22,7 @@ pub use offer::{LeaseOffer, MAPPED_WITHIN, TAKEN_WITHIN};
 
 use crate::handshake;
 use crate::layout::{ABI_VERSION, MAX_DEVICES};
+use rustix::io::Errno;
 use std::io;
 use std::sync::atomic::{AtomicU64, Ordering};
 use thiserror::Error;
@@ -30,7 +31,7 @@ use thiserror::Error;
 #[derive(Debug, Error)]
 pub enum SegmentError {
     /// The kernel refused.
-    #[error("cannot {what} a shared segment: {source}")]
+    #[error("cannot {what} a shared segment: {source}{}", remedy(.source))]
     System {
         /// What was tried.
         what: &'static str,
@@ -99,6 +100,18 @@ pub enum SegmentError {
         /// Devices that were listed.
         found: usize,
     },
+}
+
+/// What to do where a limit of this process is the cause; else nothing.
+pub(crate) fn remedy(error: &io::Error) -> &'static str {
+    match error.raw_os_error().map(Errno::from_raw_os_error) {
+        Some(Errno::FBIG) => "; raise the limit of the size of files (`ulimit -f`, LimitFSIZE=)",
+        Some(Errno::MFILE) => "; raise the limit of open files (`ulimit -n`, LimitNOFILE=)",
+        Some(Errno::NFILE) => "; close other programs, or raise fs.file-max",
+        Some(Errno::NOMEM) => "; raise the limit of memory (`ulimit -v`, LimitAS=), or end other programs",
+        Some(Errno::AGAIN) => "; raise the limit of locked memory (`ulimit -l`, LimitMEMLOCK=)",
+        _ => "",
+    }
 }
 
 fn slot_of(tick: u64, slots: usize) -> usize {

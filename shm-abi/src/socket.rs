@@ -1,10 +1,10 @@
 //! Messages with descriptors over a Unix stream socket.
 
 use bytemuck::Pod;
-use rustix::io::retry_on_intr;
+use rustix::io::{Errno, retry_on_intr};
 use rustix::net::{
-    RecvAncillaryBuffer, RecvAncillaryMessage, RecvFlags, SendAncillaryBuffer, SendAncillaryMessage,
-    SendFlags, recvmsg, sendmsg,
+    RecvAncillaryBuffer, RecvAncillaryMessage, RecvFlags, ReturnFlags, SendAncillaryBuffer,
+    SendAncillaryMessage, SendFlags, recvmsg, sendmsg,
 };
 use std::io::{self, IoSlice, IoSliceMut};
 use std::mem::MaybeUninit;
@@ -60,6 +60,10 @@ fn receive_some(socket: BorrowedFd<'_>, into: &mut [u8], fds: &mut Vec<OwnedFd>)
             fds.extend(arrived);
         }
     }
+    // The kernel leaves out descriptors for which this process has no room, and says nothing else.
+    if received.flags.contains(ReturnFlags::CTRUNC) {
+        return Err(Errno::MFILE.into());
+    }
     Ok(received.bytes)
 }
 
@@ -68,7 +72,7 @@ pub(crate) fn is_open(socket: &impl AsFd) -> bool {
     let mut byte = [0u8; 1];
     match rustix::net::recv(socket, &mut byte, RecvFlags::PEEK | RecvFlags::DONTWAIT) {
         Ok((_, received)) => received > 0,
-        Err(errno) => errno == rustix::io::Errno::AGAIN || errno == rustix::io::Errno::INTR,
+        Err(errno) => errno == Errno::AGAIN || errno == Errno::INTR,
     }
 }
 

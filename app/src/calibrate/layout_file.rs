@@ -3,6 +3,7 @@
 use super::CalibrateArgs;
 use calibration::Fit;
 use rt_core::input_file;
+use rt_core::replacement::Replacement;
 use std::fs;
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
@@ -109,18 +110,17 @@ pub(super) fn replace(file: &Path, text: &str) -> Result<(), LayoutFileError> {
 }
 
 fn write_beside(file: &Path, text: &str) -> io::Result<()> {
-    use std::os::unix::fs::PermissionsExt;
-    // A link goes on leading to the file.
-    let file = fs::canonicalize(file).unwrap_or_else(|_| file.into());
     let directory = file.parent().filter(|parent| !parent.as_os_str().is_empty()).unwrap_or(Path::new("."));
     fs::create_dir_all(directory)?;
-    let former = fs::metadata(&file).map(|former| former.permissions());
-    let mode = former.unwrap_or_else(|_| fs::Permissions::from_mode(0o666));
-    let mut beside = tempfile::Builder::new().permissions(mode).tempfile_in(directory)?;
-    beside.write_all(text.as_bytes())?;
-    beside.as_file().sync_all()?;
-    beside.persist(&file)?;
-    Ok(())
+    // A link goes on leading to its file, also to one that is not there yet.
+    let replacement = Replacement::begin(file)?;
+    if !replacement.is_beside() {
+        return Err(io::Error::other("its directory takes no other file beside it"));
+    }
+    let mut written = replacement.file()?;
+    written.write_all(text.as_bytes())?;
+    written.sync_all()?;
+    replacement.keep()
 }
 
 /// The list of devices, made where there is none, and turned into tables where it stands in one line.

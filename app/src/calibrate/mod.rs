@@ -26,8 +26,9 @@ use layout_file::LayoutFileError;
 use live::LiveError;
 use plot::PlotError;
 use report::Report;
+use rt_core::input_file;
+use rt_core::replacement::{self, Replacement};
 use rt_core::signals::StopSignals;
-use rt_core::{input_file, replacement};
 use std::io;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -192,6 +193,14 @@ pub enum CalibrateFailure {
         /// Why.
         source: io::Error,
     },
+    /// The layout is there, the figure is not.
+    #[error("{failure}; the layout is written to {}: only the figure is missing", layout.display())]
+    OnlyWritten {
+        /// The layout.
+        layout: PathBuf,
+        /// Of the figure.
+        failure: Box<CalibrateFailure>,
+    },
     /// Signals cannot be caught.
     #[error("cannot catch signals: {0}")]
     Signals(io::Error),
@@ -239,7 +248,11 @@ fn run_to_end(args: &CalibrateArgs) -> Result<(), CalibrateFailure> {
     } else if plan.write.is_none() {
         print(text.trim_end())?;
     }
-    args.plot.as_ref().map_or(Ok(()), |file| draw(file, &pairs, &found, used))
+    let drawn = args.plot.as_ref().map_or(Ok(()), |file| draw(file, &pairs, &found, used));
+    drawn.map_err(|failure| match plan.write {
+        Some(layout) => CalibrateFailure::OnlyWritten { layout, failure: Box::new(failure) },
+        None => failure,
+    })
 }
 
 /// What can be checked before anybody moves a device.
@@ -325,28 +338,30 @@ fn get_pairs(args: &CalibrateArgs) -> Result<(String, Vec<Pair>), CalibrateFailu
         seconds: args.seconds,
     };
     // Found out now, not after a minute of holding two arms together.
-    args.save_pairs.as_ref().map_or(Ok(()), |file| save_pairs(file, &[]))?;
+    args.save_pairs.as_ref().map_or(Ok(()), |file| refuse_unwritable(file))?;
     let gathered = live::gather(&wish, &signals);
-    if let Some(file) = &args.save_pairs {
+    let has_result = gathered.end.is_ok() || !gathered.pairs.is_empty();
+    if let Some(file) = args.save_pairs.as_ref().filter(|_| has_result) {
         save_pairs(file, &gathered.pairs)?;
     }
     gathered.end?;
     Ok((wish.socket.display().to_string(), gathered.pairs))
 }
 
-/// Pipes are welcome; what never ends is not.
+/// Pipes that somebody writes are welcome; what never begins or never ends is not.
 fn read_pairs(file: &Path) -> io::Result<String> {
-    use std::io::Read;
-    let mut bytes = Vec::new();
-    std::fs::File::open(file)?.take(MAX_PAIRS_BYTES + 1).read_to_end(&mut bytes)?;
-    if bytes.len() as u64 > MAX_PAIRS_BYTES {
-        return Err(io::Error::other(format!("it is larger than {MAX_PAIRS_BYTES} bytes; take fewer lines")));
-    }
+    let bytes = input_file::read_all(input_file::open_stream(file)?, MAX_PAIRS_BYTES)?;
     input_file::text(bytes)
 }
 
 /// Room for as many pairs as there may be, with all their digits.
 const MAX_PAIRS_BYTES: u64 = 256 << 20;
+
+/// Earlier pairs stay until there are others.
+fn refuse_unwritable(file: &Path) -> Result<(), CalibrateFailure> {
+    let begun = Replacement::begin(file).map(drop);
+    begun.map_err(|source| CalibrateFailure::Output { file: file.into(), source })
+}
 
 /// Numbers as short as they can be read back exactly.
 fn save_pairs(file: &Path, pairs: &[Pair]) -> Result<(), CalibrateFailure> {

@@ -8,29 +8,60 @@
 use super::CheckArgs;
 use crate::outputs::{self, Output};
 use haptics::mesh::{CloseHoles, Mesh, MeshReport, Sides};
+use io_driver::say::say;
 use nalgebra::Vector3;
 use rt_core::plain_text::{PlainJson, PlainLines};
-use rt_core::replacement;
+use rt_core::{limits, replacement};
 use serde_json::{Value, json};
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use world::model::{self, FaceNames, ModelError};
 
-/// Runs the command: status 0 if the model can be felt, 2 if it cannot, or the options do not fit.
+/// Runs the command: status 0 if the model can be felt, 2 if it cannot, or the options do not fit, 3 if it can and is not
+/// written.
 pub(crate) fn execute(args: &CheckArgs) -> ExitCode {
-    let found = understand(args).and_then(|understood| {
-        let written = args.repair.as_ref().map(|out| understood.write(out)).transpose();
-        written.map(|_| understood)
-    });
+    let found = understand(args);
+    let written = match (&found, &args.repair) {
+        (Ok(understood), Some(out)) => understood.write(out),
+        _ => Ok(()),
+    };
     let file = args.scene.display();
     let said = match (&found, args.json) {
-        (_, true) => format!("{}\n", PlainJson(format_args!("{:#}", to_json(args, &found)))),
-        (Ok(understood), false) => understood.text(args),
-        (Err(problem), false) => format!("{file}: {problem}\n{file}: cannot be felt\n"),
+        (_, true) => format!("{}\n", PlainJson(format_args!("{:#}", to_json(args, &found, &written)))),
+        (Ok(understood), false) => understood.text(args, written.is_ok()),
+        (Err(NotUnderstood::Model(problem)), false) => {
+            format!("{file}: {problem}\n{file}: cannot be felt\n")
+        }
+        (Err(NotUnderstood::Options(problem)), false) => format!("{problem}\n"),
     };
     outputs::print(&if args.json { said } else { PlainLines(said).to_string() });
-    ExitCode::from(if found.is_ok() { 0 } else { 2 })
+    match (found, written) {
+        (Ok(_), Ok(())) => ExitCode::SUCCESS,
+        (Ok(_), Err(problem)) => {
+            say(format_args!("phantom3: {problem}; the model itself can be felt"));
+            ExitCode::from(EXIT_NOT_WRITTEN)
+        }
+        (Err(_), _) => ExitCode::from(2),
+    }
+}
+
+/// As of all results that cannot be written.
+const EXIT_NOT_WRITTEN: u8 = 3;
+
+/// Why there is nothing to tell.
+enum NotUnderstood {
+    /// What was asked does not fit, whatever the model is.
+    Options(String),
+    Model(String),
+}
+
+impl NotUnderstood {
+    fn words(&self) -> &str {
+        match self {
+            Self::Options(words) | Self::Model(words) => words,
+        }
+    }
 }
 
 /// A model as a mesh.
@@ -49,16 +80,23 @@ struct Understood {
     volume: f64,
 }
 
-fn understand(args: &CheckArgs) -> Result<Understood, String> {
+fn understand(args: &CheckArgs) -> Result<Understood, NotUnderstood> {
+    check_options(args).map_err(NotUnderstood::Options)?;
+    read(args).map_err(NotUnderstood::Model)
+}
+
+fn check_options(args: &CheckArgs) -> Result<(), String> {
     if args.hand.is_some() || args.layout.is_some() {
-        return Err("--hand and --layout are for scenes, and this is a model".into());
+        return Err("--hand and --layout are for scenes, and this is a model; leave them out".into());
     }
-    if let Some(out) = &args.repair {
-        if !out.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("obj")) {
-            return Err(format!("--repair {} writes OBJ; let the name end in .obj", out.display()));
-        }
-        outputs::check(&[Output::model(out)], &[&args.scene]).map_err(|failure| failure.to_string())?;
+    let Some(out) = &args.repair else { return Ok(()) };
+    if !out.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("obj")) {
+        return Err(format!("--repair {} writes OBJ; let the name end in .obj", out.display()));
     }
+    outputs::check(&[Output::model(out)], &[&args.scene]).map_err(|failure| failure.to_string())
+}
+
+fn read(args: &CheckArgs) -> Result<Understood, String> {
     let told = |error: ModelError| error.to_string();
     let bytes = model::read_file(&args.scene).map_err(told)?;
     let soup = model::read(&args.scene, &bytes).map_err(told)?;
@@ -91,10 +129,13 @@ impl Understood {
             _ => &[],
         };
         let text = model::write_obj(&self.mesh, &self.is_lid, names);
-        replacement::write(out, text).map_err(|error| format!("cannot write {}: {error}", out.display()))
+        replacement::write(out, text).map_err(|error| {
+            let remedy = limits::remedy(&error).unwrap_or_else(|| "name a file that can be written".into());
+            format!("cannot write {}: {error}; {remedy}", out.display())
+        })
     }
 
-    fn text(&self, args: &CheckArgs) -> String {
+    fn text(&self, args: &CheckArgs, is_written: bool) -> String {
         let mut text = String::new();
         let told = self.report.to_string();
         let mut row = |name: &str, value: &str| {
@@ -116,7 +157,7 @@ impl Understood {
         if let Some(names) = self.names() {
             row("names", &names);
         }
-        if let Some(out) = &args.repair {
+        if let Some(out) = args.repair.as_ref().filter(|_| is_written) {
             row("written", &format!("{}: {}", out.display(), self.written()));
         }
         let file = args.scene.display();
@@ -178,11 +219,17 @@ impl Understood {
     }
 }
 
-fn to_json(args: &CheckArgs, found: &Result<Understood, String>) -> Value {
+fn to_json(
+    args: &CheckArgs,
+    found: &Result<Understood, NotUnderstood>,
+    written: &Result<(), String>,
+) -> Value {
     let file = args.scene.display().to_string();
     let understood = match found {
         Ok(understood) => understood,
-        Err(problem) => return json!({ "ok": false, "file": file, "problems": [{ "message": problem }] }),
+        Err(problem) => {
+            return json!({ "ok": false, "file": file, "problems": [{ "message": problem.words() }] });
+        }
     };
     let Understood { mesh, report, is_lid, names, low, high, area, volume, .. } = understood;
     let holes: Vec<Value> = report
@@ -193,9 +240,9 @@ fn to_json(args: &CheckArgs, found: &Result<Understood, String>) -> Value {
         .map(|hole| json!({ "size": hole.size_m, "at": hole.middle_B }))
         .collect();
     json!({
-        "ok": true,
+        "ok": written.is_ok(),
         "file": file,
-        "problems": [],
+        "problems": written.as_ref().err().map(|problem| json!({ "message": problem })).into_iter().collect::<Vec<_>>(),
         "warnings": understood.suspicion().into_iter().collect::<Vec<_>>(),
         "mesh": {
             "triangles": report.faces, "vertices": report.vertices, "parts": report.components,
@@ -207,7 +254,7 @@ fn to_json(args: &CheckArgs, found: &Result<Understood, String>) -> Value {
             "volume": (mesh.sides() == Sides::Solid).then_some(volume),
             "names": names.as_ref().map(FaceNames::all),
         },
-        "written": args.repair.as_ref().map(|out: &PathBuf| out.display().to_string()),
+        "written": args.repair.as_ref().filter(|_| written.is_ok()).map(|out: &PathBuf| out.display().to_string()),
     })
 }
 

@@ -3,7 +3,6 @@
 use super::DEFAULT_RATE_HZ;
 use super::numbers::parse_seconds;
 use crate::outcome::RunFailure;
-use crate::outputs::{self, Output};
 use crate::play;
 use crate::rig::Rig;
 use crate::run::RunPlan;
@@ -33,33 +32,23 @@ impl PlayArgs {
         play::rig(self.scene.as_deref(), settings, period_of(DEFAULT_RATE_HZ))
     }
 
-    /// What is written must not take the place of what is read, and names its format.
-    pub(super) fn check_outputs(&self, rig: &Rig) -> Result<(), RunFailure> {
-        let inputs = inputs(rig);
-        let (record, events) = (
-            self.record.iter().map(|file| Output::ticks(file)),
-            self.events.iter().map(|file| Output::events(file)),
-        );
-        outputs::check(&record.chain(events).collect::<Vec<_>>(), &inputs.iter().collect::<Vec<_>>())
-    }
-
-    pub(super) fn plan(&self, rig: &Rig, settings: &Settings) -> RunPlan {
-        RunPlan {
+    /// # Errors
+    /// An output that would take the place of an input, or whose name says no format.
+    pub(super) fn plan(&self, rig: &Rig, settings: &Settings) -> Result<RunPlan, RunFailure> {
+        let plan = RunPlan {
             clock: Some(ClockMode::Real),
             seconds: self.seconds,
             record: self.record.clone(),
             events: self.events.clone(),
             pictures: None,
             window: None,
-            inputs: inputs(rig),
+            inputs: rig.input_files().into_iter().chain(settings.input_files()).collect(),
             seed: 0,
             orders: None,
             settings: settings.clone(),
             attach: None,
-        }
+        };
+        plan.check_outputs(&plan.inputs)?;
+        Ok(plan)
     }
-}
-
-fn inputs(rig: &Rig) -> Vec<PathBuf> {
-    std::iter::once(&rig.scene_file).chain(rig.model_files()).cloned().collect()
 }

@@ -6,7 +6,6 @@ use super::run_help::RUN_HELP;
 use crate::calibrate::default_layout;
 use crate::control::desk::OrderSource;
 use crate::outcome::RunFailure;
-use crate::outputs::{self, Output};
 use crate::record::read::is_mcap;
 use crate::rig::{HandMode, Rig};
 use crate::run::{Attach, RunPlan};
@@ -148,19 +147,19 @@ pub(super) fn make_rig(args: &RunArgs, settings: &Settings) -> Result<Rig, RunFa
         )));
     }
     let mut scene = Scene::load(&args.scene).map_err(|error| wrong(&error))?;
-    if args.attach.is_some() {
-        // The devices are the fingers; nothing follows a script.
-        scene.hand = None;
-    }
     settings::find_data(&mut scene, &args.scene, settings);
+    // The devices are the fingers; nothing follows a script.
+    let unread_hand = if args.attach.is_some() { scene.hand.take() } else { None };
     let hand_mode = match args.hand_mode {
         HandModeName::Kinematic => HandMode::Kinematic,
         HandModeName::Impedance => HandMode::Impedance(simulated_devices(args, scene.fingers.len())),
     };
     let layout = find_layout(args)?;
     let period_ns = period_of(args.rate_hz.unwrap_or(DEFAULT_RATE_HZ));
-    Rig::new(&args.scene, scene, layout, args.hand.as_deref(), hand_mode, period_ns)
-        .map_err(|error| wrong(&error))
+    let mut rig = Rig::new(&args.scene, scene, layout, args.hand.as_deref(), hand_mode, period_ns)
+        .map_err(|error| wrong(&error))?;
+    rig.scene.hand = rig.scene.hand.or(unread_hand);
+    Ok(rig)
 }
 
 fn simulated_devices(args: &RunArgs, fingers: usize) -> SimulatedDevices {
@@ -229,25 +228,25 @@ pub(super) fn make_plan(args: &RunArgs, rig: &Rig, settings: &Settings) -> Resul
             "--attach and --clock virtual exclude each other: a driver that runs has its own clock".into(),
         ));
     }
-    let inputs = inputs(args, rig);
-    check_outputs(args, &inputs)?;
     let attach = args.attach.as_ref().map(|socket| Attach {
         socket: if socket.as_os_str().is_empty() { usual_socket("phantom3") } else { socket.clone() },
         grace: Duration::from_secs_f64(args.grace),
     });
-    Ok(RunPlan {
+    let plan = RunPlan {
         clock: args.clock.map(ClockMode::from),
         seconds: args.seconds,
         record: args.record.clone(),
         events: args.events.clone(),
         pictures: args.pictures.wanted(settings),
         window: None,
-        inputs,
+        inputs: inputs(args, rig, settings),
         seed: args.seed,
         orders: order_source(args)?,
         settings: settings.clone(),
         attach,
-    })
+    };
+    plan.check_outputs(&plan.inputs)?;
+    Ok(plan)
 }
 
 fn order_source(args: &RunArgs) -> Result<Option<OrderSource>, RunFailure> {
@@ -265,29 +264,10 @@ fn order_source(args: &RunArgs) -> Result<Option<OrderSource>, RunFailure> {
     Ok(Some(OrderSource::Input))
 }
 
-fn inputs(args: &RunArgs, rig: &Rig) -> Vec<PathBuf> {
-    // The hand that counts may be the one that the scene names.
-    let hand = rig.hand.as_ref().map(|hand| &hand.path);
-    let inputs = [
-        Some(&args.scene),
-        args.hand.as_ref(),
-        hand,
-        args.layout.as_ref(),
-        args.hand_model.as_ref(),
-        args.device.as_ref(),
-        args.orders.as_ref(),
-    ];
-    inputs.into_iter().flatten().chain(rig.model_files()).cloned().collect()
-}
-
-fn check_outputs(args: &RunArgs, inputs: &[PathBuf]) -> Result<(), RunFailure> {
-    let record = args.record.iter().map(|file| Output::ticks(file));
-    let others = args
-        .events
-        .iter()
-        .map(|file| Output::events(file))
-        .chain(args.pictures.files().map(|file| Output::picture(file)));
-    outputs::check(&record.chain(others).collect::<Vec<_>>(), &inputs.iter().collect::<Vec<_>>())
+fn inputs(args: &RunArgs, rig: &Rig, settings: &Settings) -> Vec<PathBuf> {
+    let said = [&args.hand, &args.layout, &args.hand_model, &args.device, &args.orders];
+    let said = said.into_iter().flatten().cloned();
+    said.chain(rig.input_files()).chain(settings.input_files()).collect()
 }
 
 /// Clap's own paths are never empty, not even by default.

@@ -113,7 +113,13 @@ impl Desk {
         let (mut desk, receiver) = Self::silent(rig, means)?;
         match source {
             OrderSource::File(file) => desk.play(file)?,
-            OrderSource::Input => desk.lines = Some(listen().map_err(|error| error.to_string())?),
+            OrderSource::Input => {
+                let no_thread = |error| {
+                    let missing = rt_core::limits::no_thread(&error);
+                    format!("--orders -: cannot read the standard input: {missing}")
+                };
+                desk.lines = Some(listen().map_err(no_thread)?);
+            }
         }
         Ok((desk, receiver))
     }
@@ -141,6 +147,11 @@ impl Desk {
     /// The next scene that was ordered, for who takes its rows.
     pub fn take_coming(&mut self) -> Option<Coming> {
         self.coming.pop_front()
+    }
+
+    /// Files of the scenes that a script will bring.
+    pub fn scenes_to_come(&self) -> Vec<PathBuf> {
+        self.coming.iter().flat_map(|coming| coming.rig.input_files()).collect()
     }
 
     /// The slow side's turn: what came in meanwhile. What is refused is told, and the run goes on.

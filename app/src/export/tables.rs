@@ -81,6 +81,15 @@ impl Tables {
         });
     }
 
+    /// Leaves those places as they were that are not written directly; the failure that this is.
+    pub(super) fn give_up(self, why: &dyn std::fmt::Display) -> RunFailure {
+        let is_beside = |table: &Table| table.replacement.as_ref().is_some_and(Replacement::is_beside);
+        let part =
+            self.open.iter().find(|table| !is_beside(table)).map(|table| table.out.display().to_string());
+        let left = part.map_or_else(|| NOTHING_LEFT.to_owned(), |part| format!("{part} is not complete"));
+        RunFailure::Results(format!("{why}; no table is written: {left}"))
+    }
+
     /// Writes them to their ends; returns those that are whole, and the first failure.
     pub(super) fn finish(self) -> (Vec<PathBuf>, Result<(), RunFailure>) {
         let Self { open, mut failure } = self;

@@ -11,7 +11,7 @@ mod table;
 mod visit;
 
 use crate::outcome::{RunFailure, Stop};
-use crate::outputs::tell;
+use crate::outputs::{self, Output, tell};
 use clap::Args;
 use figure::{of_entity, of_objects, of_run};
 use plot::{Figure, PlotError};
@@ -48,7 +48,7 @@ pub struct PlotArgs {
     #[arg(long)]
     svg_only: bool,
     /// Where: OUT.svg and OUT.png; with --by-entity a directory for ENTITY.svg and ENTITY.png
-    /// [default: the recording's name without its ending]
+    /// [default: the recording's name without its ending; with --objects and -objects behind it]
     #[arg(long, value_name = "OUT")]
     out: Option<PathBuf>,
 }
@@ -66,6 +66,10 @@ pub fn execute(args: &PlotArgs) -> Result<Stop, RunFailure> {
     let out = args.stem();
     if !args.by_entity {
         check_place(&out)?;
+    }
+    let inputs: Vec<&PathBuf> = [&args.recording].into_iter().chain(&args.against).collect();
+    if !args.by_entity {
+        check_files(&out, args.svg_only, &inputs)?;
     }
     let recorded = read(&args.recording)?;
     let against = args.against.as_deref().map(read).transpose()?;
@@ -107,11 +111,14 @@ fn draw(
             args.recording.display()
         )));
     }
-    for (visit, stem) in felt.iter().zip(file_stems(&felt)) {
+    let stems: Vec<PathBuf> = file_stems(&felt).into_iter().map(|stem| out.join(stem)).collect();
+    let inputs: Vec<&PathBuf> = [&args.recording].into_iter().chain(&args.against).collect();
+    stems.iter().try_for_each(|stem| check_files(stem, args.svg_only, &inputs))?;
+    for (visit, stem) in felt.iter().zip(stems) {
         let other = felt_against.iter().find(|other| other.entity == visit.entity);
         let other = against.map(Recorded::label).zip(other);
         let other = other.as_ref().map(|(label, other)| (label.as_str(), *other));
-        write(&of_entity(visit, other), &out.join(stem), args.svg_only)?;
+        write(&of_entity(visit, other), &stem, args.svg_only)?;
     }
     Ok(())
 }
@@ -119,10 +126,29 @@ fn draw(
 impl PlotArgs {
     /// Where pictures go, without the ending, which says what they are and not where.
     fn stem(&self) -> PathBuf {
-        let Some(out) = &self.out else { return self.recording.with_extension("") };
+        let Some(out) = &self.out else {
+            let stem = self.recording.with_extension("");
+            // Beside the picture of what the fingers felt, which is called as the recording.
+            return if self.objects { with_end(&stem, "-objects") } else { stem };
+        };
         let is_picture = |ending: &OsStr| ending == "svg" || ending == "png";
         if out.extension().is_some_and(is_picture) { out.with_extension("") } else { out.clone() }
     }
+}
+
+/// With something behind its last letter, whatever points it holds.
+fn with_end(path: &Path, end: &str) -> PathBuf {
+    let mut name = path.as_os_str().to_owned();
+    name.push(end);
+    name.into()
+}
+
+/// No picture takes the place of a recording.
+fn check_files(stem: &Path, svg_only: bool, inputs: &[&PathBuf]) -> Result<(), RunFailure> {
+    let endings: &[&str] = if svg_only { &[".svg"] } else { &[".svg", ".png"] };
+    let files: Vec<PathBuf> = endings.iter().map(|ending| with_end(stem, ending)).collect();
+    let outputs: Vec<_> = files.iter().map(|file| Output::chart(file)).collect();
+    outputs::check(&outputs, inputs)
 }
 
 /// Before the work, not after it.

@@ -8,7 +8,7 @@ use crate::columns::{Cell, columns, each_cell};
 use crate::record::read::{
     MOST_ROW_BYTES, RecordedRun, TimeOrder, check_begin, check_text, is_mcap, is_parquet,
 };
-use csv::StringRecord;
+use csv::{StringRecord, Terminator};
 use io_driver::say::say;
 use parquet::errors::ParquetError;
 use parquet::file::reader::{FileReader, SerializedFileReader};
@@ -171,8 +171,14 @@ impl CsvTable {
     fn open(file: &Path) -> Result<(Vec<String>, Self), csv::Error> {
         let mut opened = input_file::open(file)?;
         let cut_at = end_of_cut_file(&mut opened)?;
-        let mut reader = csv::Reader::from_reader(BoundedLines::new(opened, MOST_ROW_BYTES));
-        let columns = reader.headers()?.iter().map(str::to_owned).collect();
+        // Lines end as for `export` and `replay`: the carriage returns that Windows puts before the ends do not count.
+        let mut builder = csv::ReaderBuilder::new();
+        builder.terminator(Terminator::Any(b'\n'));
+        let mut reader = builder.from_reader(BoundedLines::new(opened, MOST_ROW_BYTES));
+        let columns = reader.headers()?;
+        let last = columns.len().saturating_sub(1);
+        let columns =
+            columns.iter().enumerate().map(|(index, name)| without_end(name, index == last).into()).collect();
         Ok((columns, Self { reader, row: StringRecord::new(), cut_at, is_cut: false }))
     }
 
@@ -183,8 +189,15 @@ impl CsvTable {
             self.is_cut = true;
             return Ok(None);
         }
-        Ok(is_row?.then(|| self.row.iter().map(|cell| Value::Text(cell.into())).collect()))
+        let last = self.row.len().saturating_sub(1);
+        let cell = |(index, cell)| Value::Text(without_end(cell, index == last).into());
+        Ok(is_row?.then(|| self.row.iter().enumerate().map(cell).collect()))
     }
+}
+
+/// The cell, of a line that may end as those of Windows.
+fn without_end(cell: &str, is_last: bool) -> &str {
+    if is_last { cell.strip_suffix('\r').unwrap_or(cell) } else { cell }
 }
 
 /// `None`: it ends with a whole line, or is a pipe.

@@ -12,6 +12,9 @@ use thiserror::Error;
 /// What stands for the standard output.
 pub const STANDARD_OUTPUT: &str = "-";
 
+/// A link that leads to so many others leads nowhere.
+const MOST_LINKS: u32 = 40;
+
 /// Format of a file with the ticks of a run.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum RunFormat {
@@ -131,12 +134,22 @@ pub fn is_same_file(a: &Path, b: &Path) -> bool {
 pub fn is_same_place(a: &Path, b: &Path) -> bool {
     match [a, b].map(is_standard_output) {
         [true, true] => true,
-        [false, false] => {
-            let [first, second] = [a, b].map(|path| std::path::absolute(path).ok());
-            first == second || is_same_file(a, b)
-        }
+        [false, false] => place_of(a) == place_of(b) || is_same_file(a, b),
         _ => false,
     }
+}
+
+/// Where a file of this name is, or would be made: at the end of all links, also of one that leads to nothing yet.
+pub fn place_of(path: &Path) -> PathBuf {
+    let mut place = path.to_path_buf();
+    for _ in 0..MOST_LINKS {
+        let Ok(target) = place.read_link() else { break };
+        place = place.parent().unwrap_or(Path::new("")).join(target);
+    }
+    let place = std::path::absolute(&place).unwrap_or(place);
+    let whole = place.canonicalize().ok();
+    let beside = || Some(place.parent()?.canonicalize().ok()?.join(place.file_name()?));
+    whole.or_else(beside).unwrap_or(place)
 }
 
 /// What people are told of where it goes.

@@ -23,7 +23,7 @@ pub struct EventsFile {
 }
 
 impl EventsFile {
-    /// Empties the file.
+    /// Begins the file, which keeps what it has until it is started.
     ///
     /// # Errors
     /// If that cannot be done, or its name says no format.
@@ -34,6 +34,19 @@ impl EventsFile {
         let lines = WholeLines::begin(file, &header)
             .map_err(|source| RecordingError::Create { file: path.clone(), source })?;
         Ok(Self { lines, path, names, book, period_ns, is_table })
+    }
+
+    /// The run goes: a file without events is a result, too.
+    ///
+    /// # Errors
+    /// If it cannot be emptied.
+    pub fn start(&mut self) -> Result<(), RecordingError> {
+        self.lines.start().map_err(|source| self.failed(source))
+    }
+
+    /// Whether the file has its earlier content still.
+    pub fn has_content(&self) -> bool {
+        self.lines.has_content()
     }
 
     /// Appends an event.
@@ -62,6 +75,7 @@ impl EventsFile {
     /// # Errors
     /// If that fails, or nobody would find it.
     pub fn finish(mut self) -> Result<u64, RecordingError> {
+        self.lines.keep().map_err(|source| self.failed(source))?;
         self.flush()?;
         let rows = self.lines.rows();
         if self.lines.is_removed() {

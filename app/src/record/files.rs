@@ -40,7 +40,7 @@ impl Files {
     pub fn first(&self, rig: &Rig, view: &View) -> Result<Vec<Recorder>, RecordingError> {
         let paths: Vec<&PathBuf> = self.record.iter().chain(&self.events).collect();
         let begun = begin_all(&paths, |number, file| self.begin(number, file, rig, view))?;
-        paths.into_iter().zip(begun).map(|(path, file)| self.start(path, file, rig)).collect()
+        Recorder::start_all(paths.into_iter().zip(begun), |path, file| self.start(path, file, rig))
     }
 
     /// The file of this number, of those of rows and then of events.
@@ -84,9 +84,9 @@ impl Files {
         number: u32,
     ) -> Result<Recorder, RecordingError> {
         let about = self.about.followed_by(rig, first);
-        let inputs = [&rig.scene_file].into_iter().chain(rig.model_files());
+        let inputs = rig.input_files();
         let taken: Vec<&PathBuf> =
-            self.taken.iter().chain(&self.record).chain(&self.events).chain(inputs).collect();
+            self.taken.iter().chain(&self.record).chain(&self.events).chain(&inputs).collect();
         let path = free_place(first, number, &taken);
         let (names, file) = (rig.names(&self.extras), Opened::recording(&path)?);
         let file = create(file, names, self.period_ns, &about, view, (&self.book, number))?;

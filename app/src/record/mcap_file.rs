@@ -33,9 +33,10 @@ use mcap::{Attachment, Compression, McapError, WriteOptions, Writer};
 use rt_core::output_file;
 use std::borrow::Cow;
 use std::collections::BTreeMap;
-use std::fs::File;
 use std::io::{self, Seek, SeekFrom, Write};
 use std::path::PathBuf;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
 use world::events::{Event, Facts, Kind};
 
 /// A chunk has so much of the run (ns): what a killed process loses at most, besides what waits for the disk.
@@ -57,6 +58,10 @@ pub(super) const ORDER_TOPIC: &str = "/orders";
 /// An MCAP file being written.
 pub struct McapFile {
     writer: Writer<NoSeek<WholeWrites>>,
+    /// The file had some, and has it until it is started.
+    has_content: bool,
+    /// The first row is there.
+    is_started: Arc<AtomicBool>,
     path: PathBuf,
     names: Names,
     period_ns: u64,
@@ -92,8 +97,8 @@ struct Channels {
 }
 
 impl McapFile {
-    /// Empties the file and writes what is known before the first tick; into what may wait for a reader, with the first
-    /// [`Self::flush`].
+    /// Writes what is known before the first tick; into what may wait for a reader, with the first [`Self::flush`], and
+    /// into a file that has content, with the first row or event.
     ///
     /// # Errors
     /// If that cannot be written.
@@ -121,12 +126,15 @@ impl McapFile {
     ) -> Result<Self, RecordingError> {
         let path = file.path().to_owned();
         let failed = |error| RecordingError::Create { file: path.clone(), source: into_io(error) };
-        let (may_wait, has_name) = (file.may_wait(), file.has_name());
-        let file = file.empty().map_err(|error| failed(error.into()))?;
-        let mut writer = options().create(NoSeek::new(WholeWrites::new(file, has_name))).map_err(failed)?;
+        let (may_wait, has_content) = (file.may_wait(), file.has_content());
+        let is_started = Arc::new(AtomicBool::new(false));
+        let writes = WholeWrites::new(file, Arc::clone(&is_started));
+        let mut writer = options().create(NoSeek::new(writes)).map_err(failed)?;
         let channels = begin(&mut writer, &names, about).map_err(failed)?;
         let mut file = Self {
             writer,
+            has_content,
+            is_started,
             path: path.clone(),
             names,
             period_ns,
@@ -168,11 +176,20 @@ impl McapFile {
         Self { is_current: true, ..self }
     }
 
+    /// Whether the file has its earlier content still.
+    pub fn has_content(&self) -> bool {
+        self.has_content && !self.is_started.load(Ordering::Relaxed)
+    }
+
     /// Appends a row and its bodies.
     ///
     /// # Errors
     /// If it or rows before it cannot be written.
     pub fn append(&mut self, row: &Row, bodies: &[BodyRow]) -> Result<(), RecordingError> {
+        if !self.is_started.swap(true, Ordering::Relaxed) {
+            // What is known before the first tick, if it is not there yet.
+            self.writer.flush().map_err(|error| self.failed(error))?;
+        }
         if self.chunk_rows == 0 {
             self.chunk_began = row.run_tick;
         } else if self.chunk_bytes > CHUNK_BYTES || self.time_ns(row.run_tick - self.chunk_began) >= CHUNK_NS
@@ -289,6 +306,10 @@ impl McapFile {
     /// # Errors
     /// If that fails, or nobody would find it.
     pub fn finish(mut self) -> Result<u64, RecordingError> {
+        if self.has_content() {
+            return Ok(0);
+        }
+        self.is_started.store(true, Ordering::Relaxed);
         self.flush()?;
         let facts = BTreeMap::from([
             ("rows".to_owned(), self.rows.to_string()),
@@ -328,6 +349,9 @@ impl McapFile {
     }
 
     fn put(&mut self, channel_id: u16, run_tick: u64, data: &[u8]) -> Result<(), McapError> {
+        if self.chunk_bytes == 0 {
+            has_memory_for_a_chunk()?;
+        }
         let time_ns = self.time_ns(run_tick);
         let header =
             MessageHeader { channel_id, sequence: self.sequence, log_time: time_ns, publish_time: time_ns };
@@ -357,6 +381,12 @@ fn value(facts: &Facts) -> f64 {
         Some(life) => life.force_n,
         None => facts.force_n.or(facts.lasted_s).unwrap_or(facts.number.unwrap_or(0) as f64),
     }
+}
+
+/// The writer panics where the compressor finds no memory, as it does at the beginning of a chunk.
+fn has_memory_for_a_chunk() -> io::Result<()> {
+    let tried = lz4::EncoderBuilder::new().build(io::sink());
+    tried.map(drop).map_err(|_| rustix::io::Errno::NOMEM.into())
 }
 
 /// Chunks are ended here and nowhere else, and go out in one piece.
@@ -414,11 +444,13 @@ fn into_io(error: McapError) -> io::Error {
     if let McapError::Io(error) = error { error } else { io::Error::other(error) }
 }
 
-/// Gathers what is written until it is flushed, then writes it whole or, if it does not fit, not at all.
+/// Gathers what is written until it is flushed, then writes it whole or, if it does not fit, not at all. Into a file that has
+/// content nothing is written before it is started.
 #[derive(Debug)]
 struct WholeWrites {
-    file: File,
+    file: Opened,
     has_name: bool,
+    is_started: Arc<AtomicBool>,
     pending: Vec<u8>,
     written_bytes: u64,
     /// Something did not fit. The library still writes an end behind it, which would be that of a whole file.
@@ -426,19 +458,20 @@ struct WholeWrites {
 }
 
 impl WholeWrites {
-    fn new(file: File, has_name: bool) -> Self {
-        Self { file, has_name, pending: Vec::new(), written_bytes: 0, has_ended: false }
+    fn new(file: Opened, is_started: Arc<AtomicBool>) -> Self {
+        let has_name = file.has_name();
+        Self { file, has_name, is_started, pending: Vec::new(), written_bytes: 0, has_ended: false }
     }
 
     /// The name is gone that the file had in the beginning.
     fn is_removed(&self) -> bool {
-        self.has_name && output_file::has_no_name(&self.file)
+        self.has_name && output_file::has_no_name(self.file.file())
     }
 
     /// Writes what is left out to the disk itself.
     fn sync(mut self) -> io::Result<()> {
         self.flush()?;
-        match self.file.sync_data() {
+        match self.file.file().sync_data() {
             // A pipe or a character device has no disk to reach.
             Err(error) if error.kind() == io::ErrorKind::InvalidInput => Ok(()),
             synced => synced,
@@ -449,8 +482,8 @@ impl WholeWrites {
     fn end(&mut self) {
         self.has_ended = true;
         // If even this fails, readers skip the last piece.
-        let _ = self.file.set_len(self.written_bytes);
-        let _ = self.file.seek(SeekFrom::Start(self.written_bytes));
+        let _ = self.file.file().set_len(self.written_bytes);
+        let _ = self.file.file().seek(SeekFrom::Start(self.written_bytes));
     }
 }
 
@@ -461,11 +494,16 @@ impl Write for WholeWrites {
     }
 
     fn flush(&mut self) -> io::Result<()> {
+        if self.is_started.load(Ordering::Relaxed) {
+            self.file.start()?;
+        } else if self.file.has_content() {
+            return self.file.reserve(self.pending.len() as u64);
+        }
         let pending = std::mem::take(&mut self.pending);
         if self.has_ended {
             return Err(io::Error::other("an earlier write failed"));
         }
-        let written = self.file.write_all(&pending);
+        let written = self.file.file().write_all(&pending);
         match written {
             Ok(()) => self.written_bytes += pending.len() as u64,
             Err(_) => self.end(),
@@ -479,16 +517,17 @@ impl Write for WholeWrites {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use std::path::Path;
 
     #[test]
     fn nothing_is_written_behind_a_write_that_did_not_fit() {
-        let mut full =
-            WholeWrites::new(File::options().write(true).open("/dev/full").expect("a device"), true);
+        let full = Opened::open(Path::new("/dev/full")).expect("a device");
+        let mut full = WholeWrites::new(full, Arc::default());
         full.write_all(b"chunk").and_then(|()| full.flush()).expect_err("full");
         let directory = tempfile::tempdir().expect("a directory");
         // Room is there again, as on a disk from which the cut piece has gone.
-        full.file = File::create(directory.path().join("end")).expect("a file");
+        full.file = Opened::open(&directory.path().join("end")).expect("a file");
         full.write_all(b"end").and_then(|()| full.flush()).expect_err("ended");
-        assert_eq!(full.file.metadata().expect("a file").len(), 0);
+        assert_eq!(full.file.file().metadata().expect("a file").len(), 0);
     }
 }

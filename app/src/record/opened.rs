@@ -1,14 +1,17 @@
 //! Output file in two steps: opened with what it has, and emptied once nothing can refuse the start any more.
 //!
-//! Problem: a run that cannot start, because another of its files cannot be made, must not cost an earlier recording; nor
-//! may one process empty what another one writes.
+//! Problem: a run that cannot start, because another of its files cannot be made, or there is no thread or no memory for
+//! it, must not cost an earlier recording; nor may one process empty what another one writes.
 //! Model: a regular file is claimed when it is opened, until it is closed. The standard output is not: who opened it lets
-//! whom they want write there.
-//! Invariant: a file that was made here and not emptied is removed again.
+//! whom they want write there. A file with content keeps it until the first row is there ([`Opened::start`]); that its
+//! beginning will fit is found out before ([`Opened::reserve`]). Any other file begins at once.
+//! Invariant: what was opened and not started is as it was: a file that was made here is removed again.
 
 use super::destination::{is_standard_output, shown};
 use crate::recording::RecordingError;
-use rt_core::output_file;
+use rt_core::{limits, output_file};
+use rustix::fs::{FallocateFlags, fallocate};
+use rustix::io::Errno;
 use rustix::termios::isatty;
 use std::fs::{File, Metadata, OpenOptions};
 use std::io;
@@ -19,12 +22,24 @@ use std::path::{Path, PathBuf};
 /// So often a file that is being opened may be removed by others who made it for nothing.
 const MOST_REMOVED: u32 = 100;
 
-/// A file that can be written, with its earlier content.
+/// A file that can be written, with its earlier content until it is started.
 #[derive(Debug)]
 pub struct Opened {
     file: File,
     path: PathBuf,
-    made: Made,
+    before: Before,
+}
+
+/// How a file was before, and is again with this value.
+#[derive(Debug, Clone, PartialEq, Eq)]
+enum Before {
+    /// A stream; or it was started, and stays.
+    Stays,
+    /// It was not there.
+    Absent(PathBuf),
+    Empty,
+    /// It has it still.
+    Content,
 }
 
 /// What is lost if a file is emptied for nothing, the least first.
@@ -35,16 +50,14 @@ enum AtStake {
     Content,
 }
 
-/// A file that was not there before, and goes again with this value.
-#[derive(Debug)]
-struct Made(Option<PathBuf>);
-
-impl Drop for Made {
+impl Drop for Opened {
     fn drop(&mut self) {
-        if let Some(path) = &self.0 {
-            // Should it be gone already, so much the better.
-            let _ = std::fs::remove_file(path);
-        }
+        // Should it be gone already, so much the better.
+        let _ = match &self.before {
+            Before::Absent(path) => std::fs::remove_file(path),
+            Before::Empty => self.file.set_len(0),
+            Before::Content | Before::Stays => Ok(()),
+        };
     }
 }
 
@@ -59,14 +72,15 @@ impl Opened {
                 return Err(io::Error::other("it was closed when this program started"));
             }
             let file = io::stdout().as_fd().try_clone_to_owned().map(File::from)?;
-            return Ok(Self { file, path: path.into(), made: Made(None) });
+            return Ok(Self { file, path: path.into(), before: Before::Stays });
         }
         for _ in 0..MOST_REMOVED {
             let (file, made) = open_or_make(path)?;
             // Whoever claimed it first writes it: it is not removed, whoever made it.
             output_file::claim(&file)?;
             if is_at(&file, path) {
-                return Ok(Self { file, path: path.into(), made: Made(made) });
+                let before = made.map_or_else(|| Before::of(&file), Before::Absent);
+                return Ok(Self { file, path: path.into(), before });
             }
         }
         Err(io::Error::other("others remove it again and again"))
@@ -74,7 +88,8 @@ impl Opened {
 
     /// A file that is open already, of which people are told under this name.
     pub fn of(file: File, path: &Path) -> Self {
-        Self { file, path: path.into(), made: Made(None) }
+        let before = Before::of(&file);
+        Self { file, path: path.into(), before }
     }
 
     /// As [`Self::open`], for a recording.
@@ -104,35 +119,77 @@ impl Opened {
         !is_standard_output(&self.path) && !output_file::has_no_name(&self.file)
     }
 
-    /// What emptying it would cost: nothing for a stream, its place for a file that is empty, else its content.
+    /// What beginning it costs if it is in vain: nothing of a stream, its place of a file that is empty, else its content.
     fn at_stake(&self) -> AtStake {
-        match self.file.metadata() {
-            _ if !self.is_emptied() => AtStake::Nothing,
-            Ok(found) if found.len() == 0 => AtStake::Place,
-            _ => AtStake::Content,
+        match &self.before {
+            Before::Stays => AtStake::Nothing,
+            Before::Absent(_) | Before::Empty => AtStake::Place,
+            Before::Content => AtStake::Content,
         }
     }
 
-    /// Empties it, and keeps it whatever becomes of it. The standard output goes on behind what is there.
+    /// It has its earlier content, and nothing may be written to it before it is started.
+    pub(super) fn has_content(&self) -> bool {
+        self.before == Before::Content
+    }
+
+    /// Finds out whether so many bytes will fit once it is emptied.
+    ///
+    /// # Errors
+    /// If they will not.
+    pub(super) fn reserve(&self, bytes: u64) -> io::Result<()> {
+        if bytes == 0 || !self.has_content() {
+            return Ok(());
+        }
+        if limits::largest_file().is_some_and(|most| bytes > most) {
+            return Err(Errno::FBIG.into());
+        }
+        match fallocate(&self.file, FallocateFlags::KEEP_SIZE, 0, bytes) {
+            Err(full @ (Errno::NOSPC | Errno::DQUOT | Errno::FBIG)) => Err(full.into()),
+            // Of a file system that cannot answer.
+            _ => Ok(()),
+        }
+    }
+
+    /// Empties it if it has content, and keeps it from now on whatever becomes of it.
     ///
     /// # Errors
     /// If the system refuses.
-    pub fn empty(self) -> io::Result<File> {
-        if self.is_emptied() {
+    pub(super) fn start(&mut self) -> io::Result<()> {
+        if self.has_content() {
             self.file.set_len(0)?;
         }
-        let Self { file, mut made, .. } = self;
-        made.0 = None;
-        Ok(file)
+        self.before = Before::Stays;
+        Ok(())
     }
 
-    /// Streams and devices have nothing to be cut off.
-    fn is_emptied(&self) -> bool {
-        !is_standard_output(&self.path) && self.file.metadata().is_ok_and(|found| found.is_file())
+    /// The file, emptied, which is kept whatever becomes of it. The standard output goes on behind what is there.
+    ///
+    /// # Errors
+    /// If the system refuses.
+    pub fn empty(mut self) -> io::Result<File> {
+        self.start()?;
+        self.file.try_clone()
+    }
+
+    /// What it is written by.
+    pub(super) fn file(&self) -> &File {
+        &self.file
     }
 }
 
-/// Opens all files and begins each, with its number. None is emptied before all are open, and those with most at stake
+impl Before {
+    /// Streams and devices have nothing to be cut off.
+    fn of(file: &File) -> Self {
+        match file.metadata() {
+            Ok(found) if found.is_file() && found.len() > 0 => Self::Content,
+            Ok(found) if found.is_file() => Self::Empty,
+            _ => Self::Stays,
+        }
+    }
+}
+
+/// Opens all files and begins each, with its number. None is begun before all are open, and those with most at stake
 /// come last: a beginning that does not fit on a disk costs none of them.
 ///
 /// # Errors

@@ -18,6 +18,7 @@ pub(crate) use csv_rows::MOST_ROW_BYTES;
 use mcap_rows::McapRows;
 use rt_core::file_kind::{self, BEGIN_BYTES};
 use rt_core::input_file;
+use rt_core::limits;
 use rt_core::plain_text::is_harmful;
 use std::io::{self, Read};
 use std::path::{Path, PathBuf};
@@ -61,6 +62,14 @@ pub enum ReadError {
         /// What is wrong.
         why: String,
     },
+    /// There is no memory for its next rows, which may be sound.
+    #[error("there is not enough memory to read {file} behind its row {rows}; {}", more_memory())]
+    Memory {
+        /// Which.
+        file: PathBuf,
+        /// Rows before it.
+        rows: u64,
+    },
     /// A part of the file is damaged.
     #[error("{file}: damaged behind {rows} good rows: {why}")]
     Damaged {
@@ -71,6 +80,20 @@ pub enum ReadError {
         /// What is wrong.
         why: String,
     },
+}
+
+impl ReadError {
+    /// Nothing is known to be wrong with the file.
+    pub fn is_of_memory(&self) -> bool {
+        matches!(self, Self::Memory { .. })
+    }
+}
+
+fn more_memory() -> String {
+    limits::memory_limit().map_or_else(
+        || "end other programs, or give the machine more memory".into(),
+        |limit| format!("raise the limit {limit}"),
+    )
 }
 
 /// The orders in a recording as far as it can be read, each with the tick in which it was taken. A table has none.

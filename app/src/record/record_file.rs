@@ -1,4 +1,6 @@
-//! A recording in one of its formats, as its thread writes it.
+//! A recording in one of its formats, as its thread writes it. Its first row or event starts it ([`Opened::start`]).
+//!
+//! [`Opened::start`]: super::Opened
 
 use super::events_file::EventsFile;
 use super::mcap_file::McapFile;
@@ -26,11 +28,20 @@ impl RecordFile {
         }
     }
 
+    /// Whether the file has its earlier content still.
+    pub(super) fn has_content(&self) -> bool {
+        match self {
+            Self::Csv(file) => file.has_content(),
+            Self::Mcap(file) => file.has_content(),
+            Self::Events(file) => file.has_content(),
+        }
+    }
+
     pub(super) fn append(&mut self, row: &Row, bodies: &[BodyRow]) -> Result<(), RecordingError> {
         match self {
             Self::Csv(file) => file.append(row, bodies),
             Self::Mcap(file) => file.append(row, bodies),
-            Self::Events(_) => Ok(()),
+            Self::Events(file) => file.start(),
         }
     }
 

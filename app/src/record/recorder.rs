@@ -50,6 +50,8 @@ pub struct Recorded {
     pub lost: u64,
     /// Why it is not complete, if it is not; has been told.
     pub failure: Option<String>,
+    /// No tick came, and the file has its earlier content.
+    pub is_as_before: bool,
 }
 
 /// Hands events to a recording, as [`Recorder::send`] does rows.
@@ -115,6 +117,10 @@ struct Shared {
     has_failed: AtomicBool,
     /// Nobody reads the standard output any more.
     reader_has_gone: AtomicBool,
+    /// The file's earlier content is there until the end.
+    has_content: AtomicBool,
+    /// The run did not begin, and the file is to be as it was.
+    is_in_vain: AtomicBool,
 }
 
 impl Recorder {
@@ -139,7 +145,7 @@ impl Recorder {
         let thread = std::thread::Builder::new()
             .name("recorder".into())
             .spawn(move || writer.run(receiver))
-            .map_err(|source| RecordingError::Create { file: path.into(), source })?;
+            .map_err(|source| RecordingError::NoThread { file: shown(path), source })?;
         let (known, changed) = (vec![None; bodies], Vec::with_capacity(bodies));
         let events =
             Some(EventFeed { events, backpressure, shared: shared.clone(), thread: thread.thread().clone() });
@@ -160,6 +166,27 @@ impl Recorder {
             shared,
             thread,
         })
+    }
+
+    /// Starts them all, or none: files of those that had been started are as they were.
+    ///
+    /// # Errors
+    /// The first for which there can be no thread.
+    pub fn start_all<'a>(
+        files: impl Iterator<Item = (&'a PathBuf, RecordFile)>,
+        mut start: impl FnMut(&Path, RecordFile) -> Result<Self, RecordingError>,
+    ) -> Result<Vec<Self>, RecordingError> {
+        let mut started = Vec::new();
+        for (path, file) in files {
+            match start(path, file) {
+                Ok(recorder) => started.push(recorder),
+                Err(error) => {
+                    started.into_iter().for_each(Self::take_back);
+                    return Err(error);
+                }
+            }
+        }
+        Ok(started)
     }
 
     /// Where to hand events over: those of a tick before its row.
@@ -271,6 +298,12 @@ impl Recorder {
         self.unit == EVENTS
     }
 
+    /// Of a run that did not begin: what was made is removed again.
+    pub fn take_back(self) {
+        self.shared.is_in_vain.store(true, Ordering::Relaxed);
+        drop(self.finish());
+    }
+
     /// Waits until everything is written.
     pub fn finish(mut self) -> Recorded {
         self.close();
@@ -282,16 +315,17 @@ impl Recorder {
             }
             std::thread::sleep(Duration::from_millis(1));
         }
-        let Self { path, unit, lost, thread, given_up, .. } = self;
+        let Self { path, unit, lost, thread, given_up, shared, .. } = self;
         let (rows, failure) = match thread.join() {
             Ok(Ok(rows)) => (rows, None),
             Ok(Err(error)) => {
                 let rows = if let RecordingError::Write { rows, .. } = error { rows } else { 0 };
                 (rows, Some(error.to_string()))
             }
-            Err(_) => (0, Some("the recorder panicked".into())),
+            Err(_) => (0, Some(panicked(&path))),
         };
-        Recorded { path, rows, unit, lost, failure: failure.or(given_up) }
+        let is_as_before = shared.has_content.load(Ordering::Relaxed);
+        Recorded { path, rows, unit, lost, failure: failure.or(given_up), is_as_before }
     }
 
     /// The thread ends with the process.
@@ -306,7 +340,14 @@ impl Recorder {
             why
         });
         let rows = self.shared.progress.taken();
-        Recorded { path: self.path, rows, unit: self.unit, lost: self.lost, failure: Some(why) }
+        Recorded {
+            path: self.path,
+            rows,
+            unit: self.unit,
+            lost: self.lost,
+            failure: Some(why),
+            is_as_before: false,
+        }
     }
 }
 
@@ -315,6 +356,17 @@ impl Shared {
     fn gaps(&self) -> MutexGuard<'_, VecDeque<(u64, u64)>> {
         self.gaps.lock().unwrap_or_else(PoisonError::into_inner)
     }
+}
+
+/// Tells of a recorder that ended by itself.
+fn panicked(path: &Path) -> String {
+    let why = format!(
+        "the recording {} ended by itself: its thread panicked, perhaps for lack of memory; what reached it before is \
+         readable",
+        shown(path).display()
+    );
+    say(format_args!("phantom3: {why}"));
+    why
 }
 
 /// The recorder's own thread.
@@ -358,6 +410,10 @@ impl RecorderThread {
             return self.abandon(error);
         }
         let Some(file) = self.file.take() else { return result };
+        self.shared.has_content.store(file.has_content(), Ordering::Relaxed);
+        if self.shared.is_in_vain.load(Ordering::Relaxed) && self.shared.progress.taken() == 0 {
+            return Ok(0);
+        }
         file.finish().or_else(|error| self.abandon(error))
     }
 

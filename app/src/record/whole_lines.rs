@@ -1,13 +1,13 @@
 //! Lines of a text file, counted once they are in it.
 //!
 //! Model: lines are gathered and written together. Into what may wait for a reader (a pipe, a terminal) even the first is
-//! written with the others, by the thread that can wait; into anything else at once.
+//! written with the others, by the thread that can wait; into a file with earlier content, which it has until then, with
+//! the first that counts; into anything else at once.
 //! Invariants: whatever goes wrong, a file ends with a complete line: a write that failed half way (a full disk) is cut
 //! back to the last line that fits. Only lines that are in the file count.
 
 use super::opened::Opened;
 use rt_core::output_file;
-use std::fs::File;
 use std::io::{self, Seek, SeekFrom, Write};
 
 /// Written at once when this much has come together.
@@ -16,8 +16,9 @@ const CHUNK_BYTES: usize = 256 * 1024;
 /// A text file being written.
 #[derive(Debug)]
 pub(crate) struct WholeLines {
-    file: File,
+    file: Opened,
     has_name: bool,
+    is_started: bool,
     /// Whole lines that are not in the file yet.
     buffer: String,
     /// End of each of these in the buffer but the header's, and its tick.
@@ -28,26 +29,39 @@ pub(crate) struct WholeLines {
 }
 
 impl WholeLines {
-    /// Empties the file and begins it with this line, which does not count; without one if it is empty.
+    /// Begins the file with this line, which does not count; without one if it is empty.
     ///
     /// # Errors
-    /// If it cannot be emptied, or the line not be written.
+    /// If the line cannot be written.
     pub(crate) fn begin(file: Opened, header: &str) -> io::Result<Self> {
-        let (may_wait, has_name) = (file.may_wait(), file.has_name());
-        let file = file.empty()?;
+        let (may_wait, has_name, has_content) = (file.may_wait(), file.has_name(), file.has_content());
         // Behind what others have written to a standard output that is a file.
-        let written_bytes = file.metadata()?.len();
+        let written_bytes = if has_content { 0 } else { file.file().metadata()?.len() };
         let mut buffer = String::with_capacity(2 * CHUNK_BYTES);
         if !header.is_empty() {
             buffer.push_str(header);
             buffer.push('\n');
         }
+        file.reserve(buffer.len() as u64)?;
+        let (ends, rows, last_tick) = (Vec::new(), 0, 0);
         let mut lines =
-            Self { file, has_name, buffer, ends: Vec::new(), written_bytes, rows: 0, last_tick: 0 };
-        if !may_wait {
+            Self { file, has_name, is_started: false, buffer, ends, written_bytes, rows, last_tick };
+        if !may_wait && !has_content {
             lines.flush()?;
         }
         Ok(lines)
+    }
+
+    /// From now on the file is a result, and what it had before is gone.
+    ///
+    /// # Errors
+    /// If it cannot be emptied.
+    pub(crate) fn start(&mut self) -> io::Result<()> {
+        if !self.is_started {
+            self.file.start()?;
+            self.is_started = true;
+        }
+        Ok(())
     }
 
     /// Appends the line that `write` makes of this tick.
@@ -55,6 +69,7 @@ impl WholeLines {
     /// # Errors
     /// If it or lines before it cannot be written.
     pub(crate) fn append(&mut self, tick: u64, write: impl FnOnce(&mut String)) -> io::Result<()> {
+        self.start()?;
         write(&mut self.buffer);
         self.buffer.push('\n');
         self.ends.push((self.buffer.len(), tick));
@@ -76,13 +91,16 @@ impl WholeLines {
     /// # Errors
     /// If that fails; lines that did reach the file are complete.
     pub(crate) fn flush(&mut self) -> io::Result<()> {
+        if self.file.has_content() {
+            return Ok(());
+        }
         let mut done = 0;
         let bytes = self.buffer.as_bytes();
         let written = loop {
             if done == bytes.len() {
                 break Ok(());
             }
-            match self.file.write(&bytes[done..]) {
+            match self.file.file().write(&bytes[done..]) {
                 Ok(0) => break Err(io::ErrorKind::WriteZero.into()),
                 Ok(more) => done += more,
                 Err(error) if error.kind() == io::ErrorKind::Interrupted => {}
@@ -95,13 +113,26 @@ impl WholeLines {
         written
     }
 
+    /// It has what it had before, and nothing of what is gathered.
+    pub(crate) fn has_content(&self) -> bool {
+        self.file.has_content()
+    }
+
+    /// At an end in order a file without lines stays, unless that would cost its earlier content.
+    ///
+    /// # Errors
+    /// As [`Self::start`].
+    pub(crate) fn keep(&mut self) -> io::Result<()> {
+        if self.has_content() { Ok(()) } else { self.start() }
+    }
+
     /// Writes everything out to the disk itself.
     ///
     /// # Errors
     /// If that fails.
     pub(crate) fn sync(&mut self) -> io::Result<()> {
         self.flush()?;
-        match self.file.sync_data() {
+        match self.file.file().sync_data() {
             // A pipe or a character device has no disk to reach.
             Err(error) if error.kind() == io::ErrorKind::InvalidInput => Ok(()),
             synced => synced,
@@ -110,7 +141,7 @@ impl WholeLines {
 
     /// The name is gone that the file had in the beginning.
     pub(crate) fn is_removed(&self) -> bool {
-        self.has_name && output_file::has_no_name(&self.file)
+        self.has_name && self.is_started && output_file::has_no_name(self.file.file())
     }
 
     /// Counts what reached the file and cuts a line that did so only in part.
@@ -126,8 +157,8 @@ impl WholeLines {
         self.written_bytes += kept as u64;
         if kept < done {
             // If even this fails, the message still says how many lines are good.
-            let _ = self.file.set_len(self.written_bytes);
-            let _ = self.file.seek(SeekFrom::Start(self.written_bytes));
+            let _ = self.file.file().set_len(self.written_bytes);
+            let _ = self.file.file().seek(SeekFrom::Start(self.written_bytes));
         }
     }
 }
@@ -147,10 +178,40 @@ mod tests {
         assert_eq!((lines.rows(), lines.last_tick()), (0, 0), "nothing is in the file");
         let bytes = lines.buffer.clone().into_bytes();
         let half = lines.ends[0].0 + 2;
-        lines.file.write_all(&bytes[..half]).expect("written");
+        lines.file.file().write_all(&bytes[..half]).expect("written");
         lines.keep_whole_lines(half);
         assert_eq!(std::fs::read_to_string(&path).expect("readable"), "head\none\n");
         assert_eq!((lines.rows(), lines.last_tick()), (1, 3));
+    }
+
+    #[test]
+    fn a_file_has_its_earlier_content_until_the_first_line_counts_and_is_as_it_was_without_one() {
+        let directory = tempfile::tempdir().expect("a directory");
+        let [content, empty, new] = ["content", "empty", "new"].map(|name| directory.path().join(name));
+        std::fs::write(&content, "earlier").expect("room");
+        std::fs::write(&empty, "").expect("room");
+        let begin = |path: &std::path::PathBuf| {
+            Opened::open(path).and_then(|file| WholeLines::begin(file, "head")).expect("begun")
+        };
+        let all = [&content, &empty, &new];
+        for mut lines in all.map(begin) {
+            lines.sync().expect("nothing to write");
+        }
+        assert_eq!(std::fs::read(&content).expect("there"), b"earlier");
+        assert_eq!(std::fs::read(&empty).expect("there"), b"");
+        assert!(!new.exists());
+        for path in [&content, &new] {
+            begin(path).keep().expect("room");
+        }
+        assert_eq!(std::fs::read(&content).expect("there"), b"earlier");
+        assert_eq!(std::fs::read(&new).expect("there"), b"head\n");
+        for path in all {
+            let mut lines = begin(path);
+            lines.append(3, |line| line.push_str("one")).and_then(|()| lines.sync()).expect("room");
+            assert!(!lines.is_removed());
+            drop(lines);
+            assert_eq!(std::fs::read_to_string(path).expect("there"), "head\none\n");
+        }
     }
 
     #[test]

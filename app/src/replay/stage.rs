@@ -43,13 +43,14 @@ impl Stage {
             Ok(_) => wrong(&format_args!("{} (a line of the scene as changed: {})", error, list(edits))),
             Err(error) => wrong(&error),
         })?;
-        scene.hand = None;
+        let its_hand = scene.hand.take().filter(|_| other.is_some());
         let directory = match recorded.about() {
             Some(about) if other.is_none() => unpack_models(&mut scene, about)?,
             _ => None,
         };
-        let rig = Rig::new(&file, scene, None, None, HandMode::Kinematic, recorded.period_ns())
+        let mut rig = Rig::new(&file, scene, None, None, HandMode::Kinematic, recorded.period_ns())
             .map_err(|error| wrong(&error))?;
+        rig.scene.hand = its_hand;
         let mut name = match other {
             Some(file) => file.display().to_string(),
             None => format!("the recording's own, {}", file.display()),

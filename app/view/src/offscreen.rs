@@ -1,10 +1,12 @@
 //! Drawing without a display: a graphics context of nobody's window.
 //!
-//! Model: `libEGL` is looked for when a picture is wanted, and asked for a context without a surface. Mesa's has one that
+//! Model: threads as many as drawing takes are tried first, since Mesa waits for ever for those that it does not get.
+//! `libEGL` is looked for when a picture is wanted, and asked for a context without a surface. Mesa's has one that
 //! draws in software where there is no graphics card. A machine without the library misses pictures and nothing else.
 
 use khronos_egl as egl;
-use std::sync::Arc;
+use rt_core::limits;
+use std::sync::{Arc, Mutex};
 
 /// `EGL_PLATFORM_SURFACELESS_MESA`.
 const SURFACELESS: egl::Enum = 0x31DD;
@@ -25,9 +27,29 @@ pub enum NoPictures {
         /// In its words.
         reason: String,
     },
+    /// A limit of this process is the likely cause.
+    #[error("no pictures: libEGL {step} ({reason}); it may lack memory: raise the limit {limit}")]
+    Memory {
+        /// What it did not do.
+        step: &'static str,
+        /// In its words.
+        reason: String,
+        /// In words.
+        limit: String,
+    },
+    /// What draws in software would wait for ever for those of its threads that it did not get.
+    #[error("no pictures: {0}")]
+    Threads(String),
     /// There is a context, and it cannot do what is needed.
     #[error("no pictures: {0}")]
     Graphics(String),
+}
+
+impl NoPictures {
+    /// The machine can draw, and this process may not use enough of it.
+    pub fn is_of_a_limit(&self) -> bool {
+        matches!(self, Self::Memory { .. } | Self::Threads(_))
+    }
 }
 
 /// A context in which this thread draws, as long as it lives.
@@ -47,10 +69,11 @@ impl Offscreen {
     /// # Errors
     /// What is missing, and what to do about it.
     pub fn new() -> Result<Self, NoPictures> {
+        refuse_without_threads()?;
         // SAFETY: the library is the system's own graphics library; its initialisers are trusted as every program's are that
         // draws anything.
         let egl = unsafe { egl::DynamicInstance::<egl::EGL1_5>::load_required() }
-            .map_err(|error| NoPictures::NoLibrary(error.to_string()))?;
+            .map_err(|error| no_library(error.to_string()))?;
         let display = open(&egl)?;
         let own = make_context(&egl, display)?;
         // SAFETY: the functions are those of the context that was made current on this thread, and used on no other.
@@ -100,8 +123,39 @@ fn make_context(
     Ok(context)
 }
 
+/// Mesa draws with a thread for each CPU, of this many at most.
+const MOST_DRAWING_THREADS: usize = 16;
+/// Of a thread that says nothing of it.
+const STACK_BYTES: usize = 8 << 20;
+
+/// Starts as many threads at once as drawing in software does, which end at once.
+fn refuse_without_threads() -> Result<(), NoPictures> {
+    let count = std::thread::available_parallelism().map_or(1, usize::from).min(MOST_DRAWING_THREADS);
+    let gate = Mutex::new(());
+    std::thread::scope(|scope| {
+        let _shut = gate.lock();
+        let wait = || drop(gate.lock());
+        let start = |_| std::thread::Builder::new().stack_size(STACK_BYTES).spawn_scoped(scope, wait);
+        let started = (0..count).map(start).collect::<std::io::Result<Vec<_>>>();
+        started.map(drop).map_err(|error| NoPictures::Threads(limits::no_thread(&error)))
+    })
+}
+
+fn no_library(reason: String) -> NoPictures {
+    match limits::memory_limit().filter(|_| !reason.contains("No such file")) {
+        Some(limit) => NoPictures::Memory { step: "cannot be loaded", reason, limit },
+        None => NoPictures::NoLibrary(reason),
+    }
+}
+
 fn failed(step: &'static str) -> impl Fn(egl::Error) -> NoPictures {
-    move |error| NoPictures::NoContext { step, reason: error.to_string() }
+    move |error| {
+        let reason = error.to_string();
+        match limits::memory_limit() {
+            Some(limit) => NoPictures::Memory { step, reason, limit },
+            None => NoPictures::NoContext { step, reason },
+        }
+    }
 }
 
 fn name_of(gl: &three_d::context::Context) -> String {

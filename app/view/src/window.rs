@@ -104,7 +104,7 @@ impl OpenWindow {
         let thread = std::thread::Builder::new()
             .name("window".into())
             .spawn(move || show(spec, stage, (told, ask, reins), &ready))
-            .map_err(|error| refused(error.to_string()))?;
+            .map_err(|error| refused(rt_core::limits::no_thread(&error)))?;
         let context = is_ready
             .recv_timeout(OPENING)
             .map_err(|_| refused("the desktop does not answer".into()))?

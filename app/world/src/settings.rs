@@ -50,6 +50,8 @@ pub struct Settings {
     pub clock: Set<&'static str>,
     /// Where what is not named otherwise is recorded; `None`: where one is.
     pub recording_directory: Set<Option<PathBuf>>,
+    /// The files that were read, the lowest first.
+    pub files: Vec<PathBuf>,
 }
 
 /// A value, and who set it.
@@ -130,6 +132,7 @@ impl Default for Settings {
             driver_configuration: set(None),
             clock: set("real"),
             recording_directory: set(None),
+            files: Vec::new(),
         }
     }
 }
@@ -140,7 +143,15 @@ impl Settings {
     /// # Errors
     /// The file cannot be read, or [`Settings::overlaid`] refuses its text.
     pub fn with_file(self, path: &Path) -> Result<Self, SceneError> {
-        self.overlaid(&read_text(path)?, path)
+        let mut with = self.overlaid(&read_text(path)?, path)?;
+        with.files.push(path.into());
+        Ok(with)
+    }
+
+    /// All files that they consist of or name, into which nothing is written.
+    pub fn input_files(&self) -> impl Iterator<Item = PathBuf> {
+        let named = [&self.bindings.value, &self.driver_configuration.value];
+        self.files.iter().chain(named.into_iter().flatten()).cloned()
     }
 
     /// These, with what `text` says; `file` is named in errors and as the origin, and not opened.

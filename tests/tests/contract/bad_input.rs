@@ -453,7 +453,7 @@ fn with_recordings(place: &Workplace) {
 }
 
 /// With room for so many megabytes of addresses.
-fn run_in_little_memory(place: &Workplace, megabytes: u32, arguments: &[&str]) -> Said {
+pub(crate) fn run_in_little_memory(place: &Workplace, megabytes: u32, arguments: &[&str]) -> Said {
     let mut program = place.prepare(std::process::Command::new("sh"));
     program.args(["-c", &format!("ulimit -v {megabytes}000; exec \"$0\" \"$@\"")]);
     program.arg(place.phantom3().get_program()).args(arguments);

@@ -36,6 +36,7 @@ mod play;
 mod plot;
 mod record;
 mod repeatable;
+mod scarce;
 mod scenes;
 mod shading;
 mod shapes;

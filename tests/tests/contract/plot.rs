@@ -57,7 +57,7 @@ fn what_moves_is_drawn_with_its_way_and_its_turn() {
     assert_eq!(said.status, Some(0), "{}", said.err);
     let said = place.run(["plot", "drop.csv", "--objects", "--svg-only"]);
     assert_eq!(said.status, Some(0), "{}", said.err);
-    let svg = std::fs::read_to_string(place.path("drop.svg")).expect("a picture").replace('\n', "");
+    let svg = std::fs::read_to_string(place.path("drop-objects.svg")).expect("a picture").replace('\n', "");
     for word in ["ball", ">y<", "moved (mm)", "turned (deg)", "time (s)"] {
         assert!(svg.contains(word), "no {word} in {svg}");
     }

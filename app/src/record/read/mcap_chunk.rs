@@ -4,7 +4,7 @@
 //! bytes can make: LZ4 makes at most 255 bytes of one.
 
 use super::mcap_record::Chunk;
-use std::io::Read;
+use std::io::{ErrorKind, Read};
 
 /// The most that a chunk's records may have: chunks of ours have 4 MiB and a message.
 const MOST_CHUNK_BYTES: u64 = 64 << 20;
@@ -18,6 +18,8 @@ pub(super) enum ChunkError {
     Compression(String),
     /// What is wrong with it.
     Damage(String),
+    /// There is no memory for what is in it.
+    Memory,
 }
 
 impl From<String> for ChunkError {
@@ -26,13 +28,21 @@ impl From<String> for ChunkError {
     }
 }
 
+/// The library tells its own lack of memory in words.
+fn wrong(error: &std::io::Error) -> ChunkError {
+    if error.kind() == ErrorKind::OutOfMemory || error.to_string().contains("allocation_failed") {
+        return ChunkError::Memory;
+    }
+    ChunkError::Damage(format!("a chunk cannot be expanded: {error}"))
+}
+
 /// The records of a chunk.
 ///
 /// # Errors
 /// Why they cannot be had.
 pub(super) fn content(chunk: &Chunk<'_>) -> Result<Vec<u8>, ChunkError> {
     let content = match chunk.compression {
-        "" => chunk.records.to_vec(),
+        "" => copied(chunk.records)?,
         "lz4" => expand(chunk)?,
         other => return Err(ChunkError::Compression(other.into())),
     };
@@ -48,16 +58,23 @@ pub(super) fn content(chunk: &Chunk<'_>) -> Result<Vec<u8>, ChunkError> {
     Ok(content)
 }
 
-fn expand(chunk: &Chunk<'_>) -> Result<Vec<u8>, String> {
+fn copied(records: &[u8]) -> Result<Vec<u8>, ChunkError> {
+    let mut content = Vec::new();
+    content.try_reserve_exact(records.len()).map_err(|_| ChunkError::Memory)?;
+    content.extend_from_slice(records);
+    Ok(content)
+}
+
+fn expand(chunk: &Chunk<'_>) -> Result<Vec<u8>, ChunkError> {
     let most = MOST_CHUNK_BYTES.min((chunk.records.len() as u64).saturating_mul(MOST_EXPANSION));
     let said = chunk.uncompressed_bytes;
     if said > most {
-        return Err(format!("a chunk says that it has {said} bytes; allowed: at most {most}"));
+        return Err(format!("a chunk says that it has {said} bytes; allowed: at most {most}").into());
     }
-    let wrong = |error: std::io::Error| format!("a chunk cannot be expanded: {error}");
-    let mut content = Vec::with_capacity(said as usize);
-    let decoder = lz4::Decoder::new(chunk.records).map_err(wrong)?;
-    decoder.take(said + 1).read_to_end(&mut content).map_err(wrong)?;
+    let mut content = Vec::new();
+    content.try_reserve_exact(said as usize).map_err(|_| ChunkError::Memory)?;
+    let decoder = lz4::Decoder::new(chunk.records).map_err(|error| wrong(&error))?;
+    decoder.take(said + 1).read_to_end(&mut content).map_err(|error| wrong(&error))?;
     Ok(content)
 }
 
@@ -101,7 +118,7 @@ mod tests {
             let lie = Chunk { uncompressed_bytes, ..chunk(&small, "lz4", &records) };
             match content(&lie).expect_err("a lie") {
                 ChunkError::Damage(why) => why,
-                ChunkError::Compression(other) => panic!("compressed by {other}"),
+                other => panic!("{other:?}"),
             }
         };
         assert!(lie(u64::MAX).contains("allowed: at most"), "{}", lie(u64::MAX));

@@ -201,6 +201,9 @@ impl McapRows {
             Kept::Facts(name, facts) if name == ABOUT || name == COLUMNS => self.take_facts(&name, facts)?,
             Kept::Chunk(Ok(records)) => self.chunk = OpenChunk { records, at: 0 },
             Kept::Chunk(Err(ChunkError::Damage(why))) => return Err(self.damaged(&why)),
+            Kept::Chunk(Err(ChunkError::Memory)) => {
+                return Err(ReadError::Memory { file: self.path.clone(), rows: self.rows });
+            }
             Kept::Chunk(Err(ChunkError::Compression(other))) => return Err(self.compressed_by(&other)),
             Kept::Damage(error) => return Err(self.damaged(&error.to_string())),
             Kept::File(file) => self.take_file(file)?,

@@ -132,3 +132,124 @@ fn a_scene_is_not_converted_onto_one_of_its_own_files() {
         assert_says(&said, &["--out", "would overwrite the input", out]);
     }
 }
+
+/// A picture of heights, 16 x 16 points.
+fn height_map() -> Vec<u8> {
+    let mut bytes = Vec::new();
+    let mut encoder = png::Encoder::new(&mut bytes, 16, 16);
+    encoder.set_color(png::ColorType::Grayscale);
+    let mut writer = encoder.write_header().expect("memory");
+    writer.write_image_data(&[7; 256]).expect("memory");
+    writer.finish().expect("memory");
+    bytes
+}
+
+/// A scene with a hand, an included file and a picture of heights in a directory of pictures.
+fn with_everything(place: &Workplace, name: &str) {
+    fs::create_dir_all(place.path("film")).expect("a directory");
+    place.write("film/frame-000003.png", height_map());
+    place.write(format!("{name}-room.toml"), "");
+    place.write(format!("{name}-hand.csv"), "t,f0_x,f0_y,f0_z\n0,0,0,0\n1,0,0,0\n");
+    let rough =
+        "height_map = { file = \"film/frame-000003.png\", size_m = [0.1, 0.1], amplitude_m = 0.001 }\n";
+    let head = format!("hand = \"{name}-hand.csv\"\ninclude = [\"{name}-room.toml\"]\n");
+    place.write(format!("{name}.toml"), head + SCENE + rough);
+}
+
+#[test]
+fn no_output_takes_the_place_of_a_file_that_the_run_its_settings_or_its_orders_name() {
+    let place = workplace();
+    with_everything(&place, "first");
+    with_everything(&place, "second");
+    place.write("keys.csv", "");
+    place.write("settings.csv", "[input]\nbindings = \"keys.csv\"\n");
+    place.write("orders.csv", "at 0.1 swap second.toml\n");
+    // By another name of the same bytes.
+    fs::hard_link(place.path("second-hand.csv"), place.path("linked.csv")).expect("a link");
+    let run = ["run", "first.toml", "--clock", "virtual", "--seconds", "0.2", "--settings", "settings.csv"];
+    let cases: [&[&str]; 9] = [
+        &["--record", "first-hand.csv"],
+        &["--record", "second-hand.csv"],
+        &["--record", "linked.csv"],
+        &["--events", "second-hand.csv"],
+        &["--record", "settings.csv"],
+        &["--record", "keys.csv"],
+        &["--record", "orders.csv"],
+        &["--snapshot", "0.1:film/frame-000003.png"],
+        &["--frames", "film"],
+    ];
+    for outputs in cases {
+        let arguments = [&run[..], &["--orders", "orders.csv"], outputs].concat();
+        let said = refused(&place, &arguments);
+        assert_says(&said, &[outputs[0], "would overwrite the input"]);
+    }
+    let said = refused(
+        &place,
+        &[&run[..], &["--frames", "new", "--snapshot", "0.1:./new/frame-000001.png"]].concat(),
+    );
+    assert_says(&said, &["--frames new", "would both write to", "frame-000001.png"]);
+    std::os::unix::fs::symlink(".", place.path("here")).expect("a link");
+    let said = refused(&place, &[&run[..], &["--record", "x.csv", "--record", "here/x.csv"]].concat());
+    assert_says(&said, &["--record here/x.csv is given twice"]);
+}
+
+#[test]
+fn a_plot_never_takes_the_place_of_a_recording_nor_that_of_objects_the_one_of_forces() {
+    let place = workplace();
+    with_recordings(&place);
+    fs::rename(place.path("good.csv"), place.path("p.svg")).expect("our own");
+    fs::copy(place.path("p.svg"), place.path("q.png")).expect("room");
+    fs::create_dir(place.path("by")).expect("a directory");
+    fs::copy(place.path("p.svg"), place.path("by/table.svg")).expect("room");
+    for arguments in [
+        &["plot", "p.svg", "--out", "p"][..],
+        &["plot", "p.svg"],
+        &["plot", "q.png"],
+        &["plot", "good.mcap", "--against", "q.png", "--out", "q"],
+    ] {
+        let said = refused(&place, arguments);
+        assert_says(&said, &["the picture", "would overwrite the input"]);
+    }
+    place.write("ball.toml", "[[finger]]\n[[entity]]\nname = \"ball\"\nshape = { kind = \"sphere\", radius_m = 0.02 }\nmass_kg = 1\n");
+    let run = ["run", "ball.toml", "--clock", "virtual", "--seconds", "0.1", "--record", "b.csv"];
+    assert_eq!(place.run(run).status, Some(0));
+    assert_eq!(place.run(["plot", "b.csv"]).status, Some(0));
+    let forces = ["b.svg", "b.png"].map(|name| fs::read(place.path(name)).expect("a picture"));
+    let said = place.run(["plot", "b.csv", "--objects"]);
+    assert_eq!(said.status, Some(0), "{}", said.err);
+    assert!(said.out.contains("b-objects.svg, .png"), "{}", said.out);
+    assert_eq!(["b.svg", "b.png"].map(|name| fs::read(place.path(name)).expect("a picture")), forces);
+    assert!(place.path("b-objects.png").exists());
+}
+
+#[test]
+fn a_model_that_is_sound_can_be_felt_also_where_it_cannot_be_written() {
+    let place = workplace();
+    place.write("cube.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n");
+    let said = place.run(["check", "cube.obj", "--repair", "none/out.obj"]);
+    assert_eq!(said.status, Some(3), "{}", said.err);
+    assert!(
+        said.out.contains("cube.obj: can be felt") && !said.out.contains("cannot be felt"),
+        "{}",
+        said.out
+    );
+    assert!(!said.out.contains("written"), "{}", said.out);
+    assert_says(&said.err, &["cannot write none/out.obj: No such file", "the model itself can be felt"]);
+    let said = place.run(["check", "cube.obj", "--repair", "none/out.obj", "--json"]);
+    assert_eq!(said.status, Some(3));
+    assert_says(&said.out, &["cannot write none/out.obj", "\"ok\": false", "\"written\": null", "\"mesh\""]);
+}
+
+/// As old Macintoshes wrote them: all commands that read tables say the same.
+#[test]
+fn a_table_whose_lines_end_in_carriage_returns_alone_is_refused_by_plot_as_by_the_others() {
+    let place = workplace();
+    with_recordings(&place);
+    let text = fs::read_to_string(place.path("good.csv")).expect("a table");
+    place.write("mac.csv", text.replace('\n', "\r"));
+    place.write("windows.csv", text.replace('\n', "\r\n"));
+    refused(&place, &["export", "mac.csv", "new.csv"]);
+    refused(&place, &["plot", "mac.csv", "--out", "new"]);
+    let said = place.run(["plot", "windows.csv", "--svg-only"]);
+    assert_eq!((said.status, said.err.as_str()), (Some(0), ""));
+}
