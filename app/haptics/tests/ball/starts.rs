@@ -4,6 +4,7 @@ use std::slice::from_ref;
 use std::sync::Arc;
 
 use crate::common::meshes::{touchable, unit_vector};
+use crate::common::models::models;
 use crate::common::ugly;
 use crate::common::*;
 use crate::mesh_oracle::{closest, corners, winding_number};
@@ -68,11 +69,16 @@ fn begin_on_ugly_meshes(seeds: std::ops::Range<u64>, starts: usize) {
     for seed in seeds {
         for (name, soup) in ugly::all(seed) {
             let mesh = Arc::new(Mesh::build(soup).unwrap().0);
-            for friction in [Friction::None, stiction()] {
-                for radius_m in [0.0, 2e-4, 1e-3, 5e-3, 0.02] {
-                    begin_all_over(name, &mesh, friction.clone(), radius_m, starts, seed);
-                }
-            }
+            begin_all_kinds_over(name, &mesh, starts, seed);
+        }
+    }
+}
+
+/// Points and balls, with and without friction.
+fn begin_all_kinds_over(name: &str, mesh: &Arc<Mesh>, starts: usize, seed: u64) {
+    for friction in [Friction::None, stiction()] {
+        for radius_m in [0.0, 2e-4, 1e-3, 5e-3, 0.02] {
+            begin_all_over(name, mesh, friction.clone(), radius_m, starts, seed);
         }
     }
 }
@@ -87,4 +93,16 @@ fn no_ball_that_begins_overlapping_is_flung() {
 #[ignore = "hours"]
 fn no_ball_that_begins_anywhere_of_ten_million_is_flung() {
     begin_on_ugly_meshes(3..40, 3400);
+}
+
+/// A thousand starts of each kind on each model, and ten thousand on small ones.
+#[test]
+#[ignore = "of other people's models: MODELS=DIRECTORY"]
+fn no_ball_that_begins_on_models_is_flung() {
+    for (name, soup) in models() {
+        let mesh = Arc::new(Mesh::build(soup).unwrap().0);
+        let starts = (100_000_000 / mesh.faces().len()).clamp(1000, 10_000);
+        println!("{name}, {} faces: {starts} starts of each kind", mesh.faces().len());
+        begin_all_kinds_over(&name, &mesh, starts, 1);
+    }
 }

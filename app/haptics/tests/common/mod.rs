@@ -5,6 +5,7 @@ pub(crate) mod laws;
 
 pub(crate) mod flawed;
 pub(crate) mod meshes;
+pub(crate) mod models;
 pub(crate) mod path;
 pub(crate) mod pictures;
 pub(crate) mod ugly;

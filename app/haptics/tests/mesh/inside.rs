@@ -2,6 +2,7 @@
 
 use crate::common::flawed::*;
 use crate::common::meshes::*;
+use crate::common::models::models;
 use crate::common::{ugly, *};
 use crate::mesh_oracle as oracle;
 use haptics::Friction;
@@ -68,6 +69,21 @@ fn inside_is_where_the_winding_number_is_positive_at_ten_million_points() {
     }
     println!("{} points inside, {} outside", all[0], all[1]);
     assert!(all[0] + all[1] > 10_000_000, "{all:?}");
+}
+
+/// As many points of each model as a sum over a hundred million faces takes.
+#[test]
+#[ignore = "of other people's models: MODELS=DIRECTORY"]
+fn inside_of_models_is_where_the_winding_number_is_positive() {
+    for (name, soup) in models() {
+        let (mesh, report) = Mesh::build(soup).unwrap();
+        if mesh.sides() == Sides::Sheet {
+            println!("{name}: {report}: passed over, since it is open");
+            continue;
+        }
+        let [inside, outside] = check_sides(&name, &mesh, 100_000_000 / mesh.faces().len());
+        println!("{name}, {} faces: {inside} points inside, {outside} outside", mesh.faces().len());
+    }
 }
 
 #[test]
