@@ -9,7 +9,7 @@ use crate::common::ugly;
 use crate::common::*;
 use crate::mesh_oracle::{closest, corners, winding_number};
 use haptics::Friction;
-use haptics::mesh::{Mesh, Sides};
+use haptics::mesh::Mesh;
 use nalgebra::Vector3;
 
 /// How far a finger would have to go at most to touch nothing \[m\]: by all faces, and the winding number beyond them.
@@ -17,7 +17,7 @@ fn overlap_m(mesh: &Mesh, hip: &Vector3<f64>, radius_m: f64) -> f64 {
     let feet = (0..mesh.faces().len()).map(|face| closest(&corners(mesh, face), hip));
     let mut ways: Vec<Vector3<f64>> = feet.map(|foot| foot - hip).collect();
     ways.sort_by(|a, b| a.norm_squared().total_cmp(&b.norm_squared()));
-    let is_inside = |p: &Vector3<f64>| mesh.sides() == Sides::Solid && winding_number(mesh, p) > 0.5;
+    let is_inside = |p: &Vector3<f64>| winding_number(mesh, p) > 0.5;
     if !is_inside(hip) {
         return (radius_m - ways[0].norm()).max(0.0);
     }

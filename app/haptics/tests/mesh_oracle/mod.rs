@@ -67,7 +67,7 @@ pub(crate) fn first_fraction(mesh: &Mesh, from: &Vector3<f64>, to: &Vector3<f64>
     fractions.min_by(f64::total_cmp)
 }
 
-/// How often the mesh goes around a point: 1 inside, 0 outside (van Oosterom & Strackee 1983).
+/// How often the closed parts of a mesh go around a point: 1 inside, 0 outside (van Oosterom & Strackee 1983).
 pub(crate) fn winding_number(mesh: &Mesh, p: &Vector3<f64>) -> f64 {
     let solid_angle = |face| {
         let [a, b, c] = corners(mesh, face).map(|corner| corner - p);
@@ -75,5 +75,6 @@ pub(crate) fn winding_number(mesh: &Mesh, p: &Vector3<f64>) -> f64 {
         let below = la * lb * lc + a.dot(&b) * lc + b.dot(&c) * la + c.dot(&a) * lb;
         2.0 * a.dot(&b.cross(&c)).atan2(below)
     };
-    (0..mesh.faces().len()).map(solid_angle).sum::<f64>() / (2.0 * TAU)
+    let is_solid = |face: &usize| mesh.faces()[*face].sides == Sides::Solid;
+    (0..mesh.faces().len()).filter(is_solid).map(solid_angle).sum::<f64>() / (2.0 * TAU)
 }
