@@ -4,7 +4,7 @@
 //! progress and watches the connection, which is how the end of the driver is noticed. A driver that was
 //! there before us may be restarted: the run goes on with it if it is back within the grace time, and is the same in all
 //! that the run is built on ([`Premises`]). A driver that hangs up and goes on has ended our lease on somebody's request,
-//! and so the run.
+//! and so the run; also one that stands still meanwhile, and is there again as the same.
 
 use crate::attachment_totals::AttachmentTotals;
 use crate::child::DriverChild;
@@ -131,7 +131,7 @@ pub fn run(
                 let words = last_words(&remains.driver);
                 drop(connection);
                 progress.end();
-                attachment = reattach(source, premises, &words, signals)?;
+                attachment = reattach(source, (premises, &remains.driver), &words, signals)?;
                 totals.go_on(&attachment.driver, describe(source, &attachment));
                 fast = remains.fast;
                 fast.reset();
@@ -239,13 +239,15 @@ fn goes_on(driver: &DriverView) -> bool {
 }
 
 fn last_words(driver: &DriverView) -> String {
-    rt_core::epitaph::read(&driver.epitaph)
-        .map_or_else(|| "it was killed, or crashed without last words".into(), |words| words.to_string())
+    rt_core::epitaph::read(&driver.epitaph).map_or_else(
+        || "it hung up without last words: it was killed, crashed, or stands still".into(),
+        |words| words.to_string(),
+    )
 }
 
 fn reattach(
     source: &mut Source,
-    premises: &Premises,
+    before: (&Premises, &DriverView),
     words: &str,
     signals: &StopSignals,
 ) -> Result<Attachment, RunFailure> {
@@ -260,7 +262,7 @@ fn reattach(
     let mut begun = Instant::now();
     let mut told = false;
     loop {
-        let error = match come_back(socket, premises) {
+        let error = match come_back(socket, before) {
             Ok(attachment) => {
                 say(format_args!(
                     "phantom3: the driver is back (process {}); the run goes on",
@@ -268,6 +270,7 @@ fn reattach(
                 ));
                 return Ok(attachment);
             }
+            Err(Absence::Same) => return Err(RunFailure::LeaseEnded),
             Err(error) if error.is_for_good() => return Err(RunFailure::OtherDriver(error.to_string())),
             Err(error) => error,
         };
@@ -295,6 +298,9 @@ enum Absence {
     NotZeroed(String),
     #[error(transparent)]
     Other(#[from] OtherDriver),
+    /// It stood still, and has not ended.
+    #[error("it is the same driver")]
+    Same,
 }
 
 impl Absence {
@@ -309,7 +315,7 @@ impl Absence {
         match self {
             Self::Other(_) => true,
             Self::Gone(error) => is_of_another_contract(error),
-            Self::NotZeroed(_) => false,
+            Self::NotZeroed(_) | Self::Same => false,
         }
     }
 }
@@ -317,8 +323,11 @@ impl Absence {
 /// The lease of the driver that the run began with, whose devices know where they are. Looked at before the lease is asked
 /// for: who zeroes them should not find somebody in command. And once more after it: in between yet another one may have
 /// come.
-fn come_back(socket: &Path, premises: &Premises) -> Result<Attachment, Absence> {
+fn come_back(socket: &Path, (premises, gone): (&Premises, &DriverView)) -> Result<Attachment, Absence> {
     let observer = client::observe(socket, "phantom3")?;
+    if observer.driver.is_same_driver(gone) {
+        return Err(Absence::Same);
+    }
     premises.judge(&observer.driver)?;
     if let Some(words) = not_zeroed::words(&observer.driver, socket) {
         return Err(Absence::NotZeroed(words));

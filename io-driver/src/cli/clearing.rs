@@ -13,10 +13,10 @@ use std::path::Path;
 use std::process::ExitCode;
 use std::time::{Duration, Instant};
 
-/// How long leaving the fault state may take, beyond a few ticks.
-const PROMPT: Duration = Duration::from_millis(100);
+/// How long the loop may take to do what it was asked, beyond a few ticks.
+pub(super) const PROMPT: Duration = Duration::from_millis(100);
 /// Between two looks at the frames.
-const LOOK: Duration = Duration::from_millis(1);
+pub(super) const LOOK: Duration = Duration::from_millis(1);
 const NAME: &str = "io-driver";
 
 /// Asks, and says what became of it.

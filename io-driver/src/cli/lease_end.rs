@@ -1,28 +1,57 @@
 //! `io-driver end-lease`.
 //!
 //! Model: whose lease it was is what the frame before the request tells; with none there is nothing to end, which is
-//! said, since whoever asks wants somebody's force away. Whoever gets no place to look from is told so.
+//! said, since whoever asks wants somebody's force away. Asked, then believed only when a new frame is of another lease or of
+//! none. Whoever gets no place to look from is told so.
 
-use super::{EXIT_USAGE, fail};
+use super::clearing::{LOOK, PROMPT};
+use super::{EXIT_FAULT, EXIT_USAGE, fail};
 use crate::print::print_line;
-use shm_abi::client;
+use crate::say::say;
+use shm_abi::{DriverView, client};
 use std::path::Path;
 use std::process::ExitCode;
+use std::time::{Duration, Instant};
 
 const NAME: &str = "io-driver";
 
 /// Asks, and says what was ended.
 pub(super) fn end_lease(socket: &Path) -> ExitCode {
-    let lease =
-        client::observe(socket, NAME).map(|observer| observer.driver.read_latest().map(|frame| frame.lease));
+    let observer = client::observe(socket, NAME);
+    let before = observer.as_ref().map(|observer| observer.driver.read_latest());
     if let Err(error) = client::end_lease(socket, NAME) {
         return fail(&error, EXIT_USAGE);
     }
-    print_line(&match lease {
-        Ok(Some(0)) => "nobody commanded the devices".into(),
-        Ok(Some(lease)) => format!("lease {lease} is ended; its force ramps out"),
-        Ok(None) => "the lease is ended, if there was one: the driver has told no frame".to_owned(),
-        Err(error) => format!("the lease is ended, if there was one; whose it was cannot be seen: {error}"),
-    });
+    let said = match (&observer, before) {
+        (_, Ok(Some(frame))) if frame.lease == 0 => "nobody commanded the devices".into(),
+        (Ok(observer), Ok(Some(frame))) => {
+            if !has_ended(&observer.driver, frame.lease) {
+                say(format_args!(
+                    "io-driver: lease {} was asked to end, and no new frame shows that it did: its force may still be on; next: \
+                     io-driver emergency-stop",
+                    frame.lease
+                ));
+                return ExitCode::from(EXIT_FAULT);
+            }
+            format!("lease {} is ended; its force ramps out", frame.lease)
+        }
+        (Err(error), _) | (_, Err(error)) => {
+            format!("the lease is ended, if there was one; whose it was cannot be seen: {error}")
+        }
+        _ => "the lease is ended, if there was one: the driver has told no frame".to_owned(),
+    };
+    print_line(&said);
     ExitCode::SUCCESS
+}
+
+/// Whether a frame of another lease, or of none, comes in time: the loop takes note with its next tick.
+fn has_ended(driver: &DriverView, lease: u64) -> bool {
+    let until = Instant::now() + PROMPT + Duration::from_nanos(driver.info().period_ns) * 5;
+    while driver.read_latest().is_none_or(|frame| frame.lease == lease) {
+        if Instant::now() >= until {
+            return false;
+        }
+        std::thread::sleep(LOOK);
+    }
+    true
 }

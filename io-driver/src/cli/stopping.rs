@@ -29,7 +29,13 @@ const NAME: &str = "io-driver";
 pub(super) fn stop(places: &Places) -> ExitCode {
     let mut not_asked: Vec<NotAsked> = Vec::new();
     for socket in &places.sockets {
-        match ask_to_end(socket) {
+        let Asked { ending, is_late } = ask_to_end(socket);
+        match ending {
+            // It was there, and ended while it was asked.
+            (Some(observer), Err(error)) if is_elsewhere(&error) => {
+                return wait_for_end(&observer, observer.driver_pid);
+            }
+            (None, Err(error)) if is_elsewhere(&error) && is_late => return say_without_last_words(),
             (_, Err(error)) if is_elsewhere(&error) => not_asked.push((socket.clone(), error)),
             (observer, answer) => {
                 let code = judge_answer(observer, answer, &places.told(socket));
@@ -79,9 +85,15 @@ fn judge_answer(observer: Option<Attachment>, answer: Result<u64, AttachError>, 
 /// An observer's place, if there was one, and the driver's answer.
 type Ending = (Option<Attachment>, Result<u64, AttachError>);
 
+struct Asked {
+    ending: Ending,
+    /// Somebody held the socket and did not answer in time: the words that motors may still be on are said.
+    is_late: bool,
+}
+
 /// Asks in a thread of its own, so that a driver that does not answer does not delay the words either; where there is
 /// none, here.
-fn ask_to_end(socket: &Path) -> Ending {
+fn ask_to_end(socket: &Path) -> Asked {
     let (tell, answers) = channel();
     let place = socket.to_path_buf();
     // It ends with the process, whatever it waits for.
@@ -89,14 +101,16 @@ fn ask_to_end(socket: &Path) -> Ending {
         let _ = tell.send(observe_and_stop(&place));
     };
     if std::thread::Builder::new().spawn(asks).is_err() {
-        return observe_and_stop(socket);
+        return Asked { ending: observe_and_stop(socket), is_late: false };
     }
-    let answer = answers.recv_timeout(PROMPT).or_else(|_| {
+    let in_time = answers.recv_timeout(PROMPT);
+    let is_late = in_time.is_err();
+    let answer = in_time.or_else(|_| {
         say_not_stopped();
         answers.recv()
     });
     // That thread cannot end without an answer but by a panic.
-    answer.unwrap_or_else(|_| observe_and_stop(socket))
+    Asked { ending: answer.unwrap_or_else(|_| observe_and_stop(socket)), is_late }
 }
 
 /// Looks on first, so that its last words can be read; without a place to look on the driver ends all the same.
@@ -126,11 +140,13 @@ fn say_not_stopped() {
     say(format_args!("io-driver: it has not stopped within {PromptWords}: the motors may still be on"));
 }
 
+fn say_without_last_words() -> ExitCode {
+    say(format_args!("io-driver: it ended without last words: the motors may still be on"));
+    ExitCode::from(EXIT_FAULT)
+}
+
 fn judge_end(driver: &DriverView) -> ExitCode {
-    let Some(words) = epitaph::read(&driver.epitaph) else {
-        say(format_args!("io-driver: it ended without last words: the motors may still be on"));
-        return ExitCode::from(EXIT_FAULT);
-    };
+    let Some(words) = epitaph::read(&driver.epitaph) else { return say_without_last_words() };
     if words.kind != EpitaphKind::Stopped {
         say(format_args!("io-driver: it ended otherwise: {words}"));
         return ExitCode::from(EXIT_FAULT);

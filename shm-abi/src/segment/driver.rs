@@ -110,6 +110,8 @@ pub struct DriverView {
     pub(super) map: Mapping<DriverSegment>,
     /// How much of a frame is read.
     frame_words: usize,
+    /// Of the memory: device and number of its file.
+    file: [u64; 2],
 }
 
 impl DriverView {
@@ -124,7 +126,14 @@ impl DriverView {
         expect("ready word", &header.ready, 1)?;
         bounds::check(header)?;
         let frame_words = frame_words(device_count(&map));
-        Ok(Self { map, frame_words })
+        let found = rustix::fs::fstat(fd)
+            .map_err(|errno| SegmentError::System { what: "identify", source: errno.into() })?;
+        Ok(Self { map, frame_words, file: [found.st_dev, found.st_ino] })
+    }
+
+    /// Whether this is the memory of the same driver, and not of one that was started after it.
+    pub fn is_same_driver(&self, other: &Self) -> bool {
+        self.file == other.file
     }
 
     /// The driver's minor version. What later ones than this added reads as zero.

@@ -7,7 +7,7 @@
 use super::SegmentError;
 use crate::layout::{CommanderSegment, DriverSegment};
 use memmap2::{MmapOptions, MmapRaw};
-use rustix::fs::{FallocateFlags, MemfdFlags, SealFlags};
+use rustix::fs::{FallocateFlags, MemfdFlags, Mode, SealFlags};
 use rustix::io::Errno;
 use rustix::pipe::{PipeFlags, SpliceFlags};
 use std::fs::File;
@@ -25,6 +25,10 @@ pub(super) fn create_memfd(name: &std::ffi::CStr, bytes: usize) -> Result<OwnedF
             other => Err(other),
         })
         .map_err(|errno| SegmentError::System { what: "create", source: errno.into() })?;
+    // Whoever is handed it could open it again by its name in proc(5), and fill memory with attributes of it that nobody
+    // accounts for.
+    rustix::fs::fchmod(&fd, Mode::RUSR | Mode::WUSR)
+        .map_err(|errno| SegmentError::System { what: "close to others", source: errno.into() })?;
     // Not only sized: a page that does not exist yet costs a page fault inside a tick, and SIGBUS if there
     // is no memory left by then.
     rustix::fs::fallocate(&fd, FallocateFlags::empty(), 0, bytes as u64)

@@ -50,7 +50,7 @@ fn an_app_whose_own_driver_is_killed_says_so_and_its_recording_is_complete() {
         process::send(children[0], Signal::KILL);
         let end = app.end();
         assert_eq!(end.status, Some(3), "{end:?}");
-        let message = "the driver is gone: it was killed, or crashed without last words (signal: 9";
+        let message = "the driver is gone: it hung up without last words: it was killed, crashed, or stands still (signal: 9";
         assert!(end.err.contains(message), "{end:?}");
         assert_eq!(table.left_behind(), Vec::<PathBuf>::new());
         table.wait_until_abandoned();
@@ -132,7 +132,7 @@ fn a_driver_that_does_not_come_back_in_time_ends_the_run() {
     press.driver.wait();
     let end = app.end();
     assert_eq!(end.status, Some(3), "{end:?}");
-    let gone = "the driver is gone: it was killed, or crashed without last words";
+    let gone = "the driver is gone: it hung up without last words: it was killed, crashed, or stands still";
     assert!(end.err.contains(&format!("{gone}; waiting up to 200ms for its return")), "{end:?}");
     assert!(end.err.contains(&format!("{gone}; after 200ms: the driver is gone:")), "{end:?}");
     assert!(!checked_times(&press.path("out.csv")).is_empty());
