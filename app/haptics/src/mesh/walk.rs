@@ -30,6 +30,7 @@
 use nalgebra::Vector3;
 
 use super::Mesh;
+use super::bvh::Leaving;
 use super::crossing::{follow_crossing, meet_others, plane_at_crossing};
 use super::draw::{Draw, Drawn};
 use super::facing::facing;
@@ -236,22 +237,50 @@ fn fly(mesh: &Mesh, place: Place, hip_B: Vector3<f64>) -> Option<Place> {
     let side = place.on.side();
     let facet = Facet::of(mesh, side);
     let vertices_of = |face: u32| mesh.faces[face as usize].vertices;
+    let way_B = [&place.point_B, &hip_B];
+    let leaving = &Left { mesh, on: place.on };
     let hit = match place.on {
-        On::Face(_) => mesh.first_hit_of_others(&place.point_B, &hip_B, |face| face == side.face),
+        On::Face(_) => mesh.first_hit_in_flight(way_B, leaving, |face| face == side.face),
         On::Edge(_, edge) => {
             let ends = [edge, next(edge)].map(|corner| facet.face.vertices[corner]);
             let has_both = |face| ends.iter().all(|end| vertices_of(face).contains(end));
-            mesh.first_hit_of_others(&place.point_B, &hip_B, has_both)
+            mesh.first_hit_in_flight(way_B, leaving, has_both)
         }
         On::Vertex(_, corner) => {
             let tip = facet.face.vertices[corner];
-            mesh.first_hit_of_others(&place.point_B, &hip_B, |face| vertices_of(face).contains(&tip))
+            mesh.first_hit_in_flight(way_B, leaving, |face| vertices_of(face).contains(&tip))
         }
         On::Crossing(_, other) => {
-            mesh.first_hit_of_others(&place.point_B, &hip_B, |face| face == side.face || face == other.face)
+            mesh.first_hit_in_flight(way_B, leaving, |face| face == side.face || face == other.face)
         }
     };
     hit.map(|hit| Place::hit(&hit))
+}
+
+/// What a flight leaves.
+struct Left<'m> {
+    mesh: &'m Mesh,
+    on: On,
+}
+
+impl Leaving for Left<'_> {
+    fn is_face(&self) -> bool {
+        matches!(self.on, On::Face(_))
+    }
+
+    fn is_far_side(&self, normal_B: &Vector3<f64>) -> bool {
+        match self.on {
+            On::Face(side) => Facet::of(self.mesh, side).normal_B.dot(normal_B) < BACK_TO_BACK,
+            On::Edge(..) | On::Vertex(..) => true,
+            // It is as far from either face as the hit was rounded.
+            On::Crossing(..) => false,
+        }
+    }
+
+    fn lies_upon(&self, normal_B: &Vector3<f64>) -> bool {
+        let On::Face(side) = self.on else { return false };
+        Facet::of(self.mesh, side).normal_B.dot(normal_B) < ANTIPARALLEL
+    }
 }
 
 /// The plane that the god-object sees on a face: its normal, and `normal . x` of its points.
@@ -293,6 +322,10 @@ pub(super) fn plane_through(
     (normal_B, normal_B.dot(hip_B) + depth_m)
 }
 
+/// Cosine of 154 degrees: a blade of less than 26 degrees is thinner than the tolerance where no edge is near.
+const BACK_TO_BACK: f64 = -0.9;
+/// Cosine of an angle that differs from 180 degrees by 1e-6 rad.
+const ANTIPARALLEL: f64 = -1.0 + 0.5e-12;
 /// Steps without a way between faces that cross: three of them hold, in pairs, and each pair may be left over an edge of each.
 const MAX_TURNS: u32 = 12;
 /// A way that leaves an edge by less than this per length runs along it: its crossing would be rounding.

@@ -20,6 +20,7 @@ mod moving;
 mod outlying;
 mod overlaps;
 mod parts;
+mod plates;
 mod queries;
 mod walk;
 mod wedges;
