@@ -50,7 +50,7 @@ fn without_room(around: &[(f64, Side)], is_upward: impl Fn(Side) -> bool) -> Vec
     for i in 0..crowd {
         let (one, other) = (i, (i + 1) % crowd);
         let gap = (around[other].0 - around[one].0).rem_euclid(TAU);
-        let is_same = gap < SMALLEST_GAP_RAD || gap > TAU - SMALLEST_GAP_RAD;
+        let is_same = !(SMALLEST_GAP_RAD..=TAU - SMALLEST_GAP_RAD).contains(&gap);
         if is_same && is_upward(around[one].1) && !is_upward(around[other].1) {
             around.swap(one, other);
         }

@@ -31,6 +31,7 @@ use nalgebra::Vector3;
 
 use super::Mesh;
 use super::bvh::Leaving;
+use super::crack::{self, Beyond};
 use super::crossing::{follow_crossing, meet_others, plane_at_crossing};
 use super::draw::{Draw, Drawn};
 use super::facing::facing;
@@ -66,7 +67,16 @@ pub(crate) struct Walked {
 pub(crate) fn stand(mesh: &Mesh, mut place: Place, input: &ConeInput) -> Option<(Place, TangentView)> {
     let hip_B = input.hip_B;
     for _ in 0..MAX_FLIGHTS {
-        if let Some(on) = facing(mesh, place, hip_B) {
+        if let Some(mut on) = facing(mesh, place, hip_B) {
+            if mesh.faces[place.face() as usize].is_beside {
+                if let On::Crossing(side, other) = on
+                    && let Some(next) = crack::off_crossing(mesh, &place.point_B, [side, other], &hip_B)
+                {
+                    place = next;
+                    continue;
+                }
+                on = crack::but_no_wall(mesh, &place, on, &hip_B);
+            }
             let (normal_B, offset_m) = match on {
                 On::Face(side) => plane_of_face(mesh, side),
                 On::Edge(side, edge) => plane_on_edge(mesh, side, edge, hip_B),
@@ -76,12 +86,29 @@ pub(crate) fn stand(mesh: &Mesh, mut place: Place, input: &ConeInput) -> Option<
             place.on = on;
             return Some((place, TangentView::new(&place.point_B, normal_B, offset_m, input)));
         }
-        place = match rim(mesh, place) {
-            Some(rim) => rim,
-            None => fly(mesh, place, hip_B)?,
+        if let Some(rim) = rim(mesh, place) {
+            place = rim;
+            continue;
+        }
+        let is_beside = mesh.faces[place.face() as usize].is_beside;
+        place = match if is_beside { crack::beyond(mesh, place, &hip_B) } else { None } {
+            Some(Beyond::Near) => return Some(at_rest_at(mesh, place, input)),
+            Some(Beyond::At(place)) => place,
+            None => fly(mesh, place, hip_B)
+                .filter(|landed| !is_beside || !crack::is_in_crack(mesh, &place.point_B, landed, &hip_B))?,
         };
     }
     None
+}
+
+/// On an edge or a vertex that holds the HIP back though it lies beyond: above a crack.
+#[cold]
+fn at_rest_at(mesh: &Mesh, place: Place, input: &ConeInput) -> (Place, TangentView) {
+    let (normal_B, offset_m) = match place.on {
+        On::Edge(side, edge) => plane_on_edge(mesh, side, edge, input.hip_B),
+        _ => plane_at_vertex(place.point_B, input.hip_B),
+    };
+    (place, TangentView::new(&place.point_B, normal_B, offset_m, input))
 }
 
 /// Goes on from where the god-object stands until nothing draws it any further; `None` if it is free and gone.
@@ -333,4 +360,4 @@ const PARALLEL: f64 = 1e-10;
 /// Nearer to the end of an edge than this share of it is at the vertex.
 const SNAP: f64 = 1e-9;
 /// Nearer to an edge than this share of the mesh's extent is on it: a few times what [`Mesh::first_hit`] tolerates.
-const RIM: f64 = 4e-13;
+pub(super) const RIM: f64 = 4e-13;

@@ -8,6 +8,7 @@ mod mesh_oracle;
 
 mod accuracy;
 mod build;
+mod cracks;
 mod crossing;
 mod energy;
 mod folds;
