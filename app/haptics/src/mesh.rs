@@ -22,9 +22,11 @@
 //! # Ok::<(), haptics::mesh::MeshError>(())
 //! ```
 
+mod beside;
 mod build;
 mod bvh;
 mod cone;
+mod crack;
 mod crossed;
 mod crossing;
 mod crowded;
@@ -66,7 +68,7 @@ pub use hole::CloseHoles;
 pub use labels::FaceData;
 pub use mesh_cone::{Beginning, MeshCone};
 pub use normals::{SHARPEST_CREASE_RAD, VertexNormals};
-pub use report::{Finding, MeshReport, OpenHole, OpenHoles};
+pub use report::{Finding, MeshReport, NarrowGaps, OpenHole, OpenHoles};
 pub(crate) use rolling::BallOnMesh;
 pub use soup::TriangleSoup;
 pub use uv::CornerUv;
@@ -87,6 +89,8 @@ pub struct Mesh {
     sides: Sides,
     /// Whether any part is closed.
     has_inside: bool,
+    /// Whether any part lies beside another one.
+    has_cracks: bool,
     extent_m: f64,
     /// Of all meshes that this process has built, which. An address would be another mesh's as soon as this one is gone.
     identity: u64,
@@ -121,9 +125,9 @@ impl Mesh {
     #[must_use]
     pub fn into_sheet(mut self) -> Self {
         for face in &mut self.faces {
-            (face.sides, face.is_crossed) = (Sides::Sheet, false);
+            (face.sides, face.is_crossed, face.is_beside) = (Sides::Sheet, false, false);
         }
-        Self { sides: Sides::Sheet, has_inside: false, ..self }
+        Self { sides: Sides::Sheet, has_inside: false, has_cracks: false, ..self }
     }
 
     /// Solid if all of its parts are; each [`Face`] says it of its own part.

@@ -90,10 +90,21 @@ impl Mesh {
         let vertices = vertices.into_boxed_slice();
         let bvh = Bvh::build(&faces, &vertices);
         let identity = BUILT.fetch_add(1, Ordering::Relaxed);
-        let mut mesh =
-            Self { faces, vertices, bvh, sides, has_inside, extent_m, identity, uv: None, labels: None };
+        let mut mesh = Self {
+            faces,
+            vertices,
+            bvh,
+            sides,
+            has_inside,
+            extent_m,
+            identity,
+            uv: None,
+            labels: None,
+            has_cracks: false,
+        };
         report.crossed = mesh.mark_crossed();
         mesh.turn_outward(&parts, &mut report);
+        report.narrow_gaps = mesh.mark_beside(&parts);
         Ok((mesh, report))
     }
 }
@@ -116,7 +127,15 @@ fn face(triangle: &Triangle, links: &[Link; 3], sides: Sides, vertices: &[Vector
     let normal_B = area_vector(&corners).normalize();
     let [a, b, c] = corners.map(|corner| normal_B.dot(&corner));
     let offset_m = 0.5 * (a.min(b).min(c) + a.max(b).max(c));
-    Face { normal_B, offset_m, vertices: triangle.corners, links: *links, sides, is_crossed: false }
+    Face {
+        normal_B,
+        offset_m,
+        vertices: triangle.corners,
+        links: *links,
+        sides,
+        is_crossed: false,
+        is_beside: false,
+    }
 }
 
 fn report_edges(triangles: &[Triangle], links: &[[Link; 3]], report: &mut MeshReport) {

@@ -37,6 +37,7 @@ pub use nearest::Nearest;
 pub(crate) use nearest::TooMany;
 pub use outlying::Linear;
 pub use segment::Hit;
+pub(in crate::mesh) use segment::Leaving;
 #[cfg(test)]
 pub(crate) use stack::POPPED;
 

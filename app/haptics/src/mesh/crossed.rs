@@ -16,7 +16,7 @@ use nalgebra::Vector3;
 use super::{Mesh, Sides};
 
 /// Boxes of more pairs overlap only where faces lie in heaps upon one another.
-const MOST_PAIRS: usize = 1000;
+pub(super) const MOST_PAIRS: usize = 1000;
 
 impl Mesh {
     /// Marks the faces that others pass through, and says how many they are.
@@ -34,7 +34,7 @@ impl Mesh {
     pub(super) fn for_each_crossed_pair(&self, mut visit: impl FnMut([usize; 2])) -> bool {
         let slack_m = TOUCHING * self.extent_m;
         let mut left = MOST_PAIRS.saturating_mul(self.faces.len());
-        self.bvh.for_each_pair(|i, j| {
+        self.bvh.for_each_pair(0.0, |i, j| {
             let pair = [i, j].map(|face| &self.faces[face as usize]);
             let corners = || pair.map(|face| face.vertices.map(|vertex| self.vertices[vertex as usize]));
             let are_solid = pair.iter().all(|face| face.sides == Sides::Solid);
@@ -50,7 +50,7 @@ impl Mesh {
 }
 
 /// Whether two triangles have a common point, or cannot be told from such by as much as `slack_m`.
-fn do_cross(corners: &[[Vector3<f64>; 3]; 2], normals: &[Vector3<f64>; 2], slack_m: f64) -> bool {
+pub(super) fn do_cross(corners: &[[Vector3<f64>; 3]; 2], normals: &[Vector3<f64>; 2], slack_m: f64) -> bool {
     // From one of them, so that nothing is rounded as what is far from the origin.
     let origin = corners[0][0];
     let corners = corners.map(|corners| corners.map(|corner| corner - origin));

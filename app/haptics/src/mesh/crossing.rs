@@ -14,6 +14,7 @@
 use nalgebra::Vector3;
 
 use super::Mesh;
+use super::crack::over_ledge;
 use super::place::{Facet, On, Place, Side, previous};
 use super::walk::{Reached, cross_face, plane_through, rim};
 
@@ -65,6 +66,11 @@ pub(super) fn meet_others(mesh: &Mesh, place: Place, reached: Reached, hip_B: &V
         let on_rim = |place: Place| rim(mesh, place).unwrap_or(place).on;
         let met = on_rim(Place::hit(&hit));
         if !leads_past(mesh, met, &way_B) {
+            if here.is_beside
+                && let Some(on_top) = over_ledge(mesh, [side, met.side()], &hit.point_B, &way_B, hip_B)
+            {
+                return Reached::Rim(on_top);
+            }
             let to_hip_B = hip_B - hit.point_B;
             // Of three that meet, each pair has its turn.
             let side = if let On::Crossing(_, other) = place.on { other } else { side };

@@ -22,6 +22,8 @@ pub struct Face {
     pub sides: Sides,
     /// Whether other faces of closed parts pass through it, of which no link tells.
     pub is_crossed: bool,
+    /// Whether another closed part lies beside it, touching or with a crack between them that no finger feels.
+    pub is_beside: bool,
 }
 
 /// The neighbour across an edge: which face, which of its edges is the shared one, and how it is wound.

@@ -2,7 +2,7 @@
 
 use nalgebra::Vector3;
 
-use super::bvh::{TooMany, closest_on};
+use super::bvh::{Leaving, TooMany, closest_on};
 use super::fan::for_each_around;
 use super::place::Side;
 use super::{Face, Hit, Linear, Mesh, Nearest, Sides, Triangles};
@@ -26,6 +26,16 @@ impl Mesh {
         is_skipped: impl Fn(u32) -> bool,
     ) -> Option<Hit> {
         self.bvh.first_hit_of_others(self.triangles(), Sides::Solid, from_B, to_B, is_skipped)
+    }
+
+    /// As [`Self::first_hit_of_others`], from a point of the surface that is left.
+    pub(super) fn first_hit_in_flight(
+        &self,
+        way_B: [&Vector3<f64>; 2],
+        leaving: &impl Leaving,
+        is_skipped: impl Fn(u32) -> bool,
+    ) -> Option<Hit> {
+        self.bvh.first_hit_in_flight(self.triangles(), way_B, leaving, is_skipped)
     }
 
     /// A point of the mesh nearest to a point on either side, at a cost that a tick can bear.

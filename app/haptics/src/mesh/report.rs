@@ -62,6 +62,34 @@ fn short(number: f64) -> f64 {
     format!("{number:.2e}").parse().unwrap_or(number)
 }
 
+/// Faces of closed parts that lie beside other parts, without a gap or with one that no finger feels.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct NarrowGaps {
+    /// How many.
+    pub faces: usize,
+    /// The widest such gap (m).
+    pub widest_m: f64,
+    /// The middle of one of them (m).
+    pub first_B: Option<[f64; 3]>,
+}
+
+impl fmt::Display for NarrowGaps {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { faces, widest_m, first_B } = self;
+        let has = plural(*faces, "face lies", "faces lie");
+        let widest = short(*widest_m);
+        write!(f, "{faces} {has} beside another part, {widest} m away or less")?;
+        if let Some(at) = first_B {
+            let [x, y, z] = at.map(|x| if x.abs() < ROUNDING { 0.0 } else { short(x) });
+            write!(f, " (one at [{x}, {y}, {z}])")?;
+        }
+        write!(
+            f,
+            ": a point slides over such gaps; join the parts in the program that made them if they are one"
+        )
+    }
+}
+
 /// What a mesh is made of, and what had to be done to the input to make it.
 ///
 /// Indices are those of the input, from 0: of faces, unless a field says vertices.
@@ -105,6 +133,8 @@ pub struct MeshReport {
     pub turned_edges: Finding,
     /// Faces of the mesh that others pass through.
     pub crossed: usize,
+    /// Faces of the mesh that lie beside other parts.
+    pub narrow_gaps: NarrowGaps,
     /// Rims of the mesh that are whole loops, with their sizes.
     pub open_holes: OpenHoles,
 }
@@ -178,6 +208,9 @@ impl fmt::Display for MeshReport {
                 "\n{} {faces} crossed by others: felt as far as they are outside of these",
                 self.crossed
             )?;
+        }
+        if self.narrow_gaps.faces > 0 {
+            write!(f, "\n{}", self.narrow_gaps)?;
         }
         if self.open_holes.count > 0 {
             write!(f, "\n{}", self.open_holes)?;

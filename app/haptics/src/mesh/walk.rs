@@ -30,6 +30,8 @@
 use nalgebra::Vector3;
 
 use super::Mesh;
+use super::bvh::Leaving;
+use super::crack::{self, Beyond};
 use super::crossing::{follow_crossing, meet_others, plane_at_crossing};
 use super::draw::{Draw, Drawn};
 use super::facing::facing;
@@ -65,7 +67,16 @@ pub(crate) struct Walked {
 pub(crate) fn stand(mesh: &Mesh, mut place: Place, input: &ConeInput) -> Option<(Place, TangentView)> {
     let hip_B = input.hip_B;
     for _ in 0..MAX_FLIGHTS {
-        if let Some(on) = facing(mesh, place, hip_B) {
+        if let Some(mut on) = facing(mesh, place, hip_B) {
+            if mesh.faces[place.face() as usize].is_beside {
+                if let On::Crossing(side, other) = on
+                    && let Some(next) = crack::off_crossing(mesh, &place.point_B, [side, other], &hip_B)
+                {
+                    place = next;
+                    continue;
+                }
+                on = crack::but_no_wall(mesh, &place, on, &hip_B);
+            }
             let (normal_B, offset_m) = match on {
                 On::Face(side) => plane_of_face(mesh, side),
                 On::Edge(side, edge) => plane_on_edge(mesh, side, edge, hip_B),
@@ -75,12 +86,29 @@ pub(crate) fn stand(mesh: &Mesh, mut place: Place, input: &ConeInput) -> Option<
             place.on = on;
             return Some((place, TangentView::new(&place.point_B, normal_B, offset_m, input)));
         }
-        place = match rim(mesh, place) {
-            Some(rim) => rim,
-            None => fly(mesh, place, hip_B)?,
+        if let Some(rim) = rim(mesh, place) {
+            place = rim;
+            continue;
+        }
+        let is_beside = mesh.faces[place.face() as usize].is_beside;
+        place = match if is_beside { crack::beyond(mesh, place, &hip_B) } else { None } {
+            Some(Beyond::Near) => return Some(at_rest_at(mesh, place, input)),
+            Some(Beyond::At(place)) => place,
+            None => fly(mesh, place, hip_B)
+                .filter(|landed| !is_beside || !crack::is_in_crack(mesh, &place.point_B, landed, &hip_B))?,
         };
     }
     None
+}
+
+/// On an edge or a vertex that holds the HIP back though it lies beyond: above a crack.
+#[cold]
+fn at_rest_at(mesh: &Mesh, place: Place, input: &ConeInput) -> (Place, TangentView) {
+    let (normal_B, offset_m) = match place.on {
+        On::Edge(side, edge) => plane_on_edge(mesh, side, edge, input.hip_B),
+        _ => plane_at_vertex(place.point_B, input.hip_B),
+    };
+    (place, TangentView::new(&place.point_B, normal_B, offset_m, input))
 }
 
 /// Goes on from where the god-object stands until nothing draws it any further; `None` if it is free and gone.
@@ -236,22 +264,50 @@ fn fly(mesh: &Mesh, place: Place, hip_B: Vector3<f64>) -> Option<Place> {
     let side = place.on.side();
     let facet = Facet::of(mesh, side);
     let vertices_of = |face: u32| mesh.faces[face as usize].vertices;
+    let way_B = [&place.point_B, &hip_B];
+    let leaving = &Left { mesh, on: place.on };
     let hit = match place.on {
-        On::Face(_) => mesh.first_hit_of_others(&place.point_B, &hip_B, |face| face == side.face),
+        On::Face(_) => mesh.first_hit_in_flight(way_B, leaving, |face| face == side.face),
         On::Edge(_, edge) => {
             let ends = [edge, next(edge)].map(|corner| facet.face.vertices[corner]);
             let has_both = |face| ends.iter().all(|end| vertices_of(face).contains(end));
-            mesh.first_hit_of_others(&place.point_B, &hip_B, has_both)
+            mesh.first_hit_in_flight(way_B, leaving, has_both)
         }
         On::Vertex(_, corner) => {
             let tip = facet.face.vertices[corner];
-            mesh.first_hit_of_others(&place.point_B, &hip_B, |face| vertices_of(face).contains(&tip))
+            mesh.first_hit_in_flight(way_B, leaving, |face| vertices_of(face).contains(&tip))
         }
         On::Crossing(_, other) => {
-            mesh.first_hit_of_others(&place.point_B, &hip_B, |face| face == side.face || face == other.face)
+            mesh.first_hit_in_flight(way_B, leaving, |face| face == side.face || face == other.face)
         }
     };
     hit.map(|hit| Place::hit(&hit))
+}
+
+/// What a flight leaves.
+struct Left<'m> {
+    mesh: &'m Mesh,
+    on: On,
+}
+
+impl Leaving for Left<'_> {
+    fn is_face(&self) -> bool {
+        matches!(self.on, On::Face(_))
+    }
+
+    fn is_far_side(&self, normal_B: &Vector3<f64>) -> bool {
+        match self.on {
+            On::Face(side) => Facet::of(self.mesh, side).normal_B.dot(normal_B) < BACK_TO_BACK,
+            On::Edge(..) | On::Vertex(..) => true,
+            // It is as far from either face as the hit was rounded.
+            On::Crossing(..) => false,
+        }
+    }
+
+    fn lies_upon(&self, normal_B: &Vector3<f64>) -> bool {
+        let On::Face(side) = self.on else { return false };
+        Facet::of(self.mesh, side).normal_B.dot(normal_B) < ANTIPARALLEL
+    }
 }
 
 /// The plane that the god-object sees on a face: its normal, and `normal . x` of its points.
@@ -293,6 +349,10 @@ pub(super) fn plane_through(
     (normal_B, normal_B.dot(hip_B) + depth_m)
 }
 
+/// Cosine of 154 degrees: a blade of less than 26 degrees is thinner than the tolerance where no edge is near.
+const BACK_TO_BACK: f64 = -0.9;
+/// Cosine of an angle that differs from 180 degrees by 1e-6 rad.
+const ANTIPARALLEL: f64 = -1.0 + 0.5e-12;
 /// Steps without a way between faces that cross: three of them hold, in pairs, and each pair may be left over an edge of each.
 const MAX_TURNS: u32 = 12;
 /// A way that leaves an edge by less than this per length runs along it: its crossing would be rounding.
@@ -300,4 +360,4 @@ const PARALLEL: f64 = 1e-10;
 /// Nearer to the end of an edge than this share of it is at the vertex.
 const SNAP: f64 = 1e-9;
 /// Nearer to an edge than this share of the mesh's extent is on it: a few times what [`Mesh::first_hit`] tolerates.
-const RIM: f64 = 4e-13;
+pub(super) const RIM: f64 = 4e-13;

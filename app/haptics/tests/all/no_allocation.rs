@@ -3,6 +3,7 @@
 
 use crate::{common, counting, solids, trees};
 
+use common::flawed;
 use common::*;
 use counting::CALLS;
 use haptics::mesh::{Mesh, make};
@@ -31,6 +32,26 @@ fn a_step_on_a_mesh_never_allocates() {
     }
     assert_eq!(CALLS.get() - before, 0);
     assert!(free > 1000 && stuck > 1000 && slid > 1000, "{free} {stuck} {slid}");
+}
+
+#[test]
+fn a_slide_over_a_hairline_crack_never_allocates() {
+    let tile = |x: f64| flawed::moved(make::cuboid([0.04, 0.02, 0.04]), [x, 0.0, 0.0]);
+    let tiles = flawed::together([tile(-0.02 - 1e-7), tile(0.02 + 1e-7), tile(0.06)]);
+    let (mesh, report) = Mesh::build(tiles).unwrap();
+    assert!(report.narrow_gaps.faces > 0, "{report}");
+    let entity = entity(std::sync::Arc::new(mesh), stiction());
+    let mut finger = Finger::new(0.0, 1).unwrap();
+    let (mut noise, mut held) = (Noise(12), 0);
+    let before = CALLS.get();
+    for i in 0..50_000 {
+        let t = f64::from(i) * DT;
+        let hip = Vector3::new(0.02 * (7.0 * t).sin(), 0.0095 + 1e-3 * (2.0 * t).sin(), 0.01 * t.cos());
+        let out = finger.step(std::slice::from_ref(&entity), &(hip + noise.vector(1e-6)), DT);
+        held += u32::from(out.entity.is_some());
+    }
+    assert_eq!(CALLS.get() - before, 0);
+    assert!(held > 20_000, "{held}");
 }
 
 #[test]

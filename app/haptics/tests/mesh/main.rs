@@ -8,6 +8,7 @@ mod mesh_oracle;
 
 mod accuracy;
 mod build;
+mod cracks;
 mod crossing;
 mod energy;
 mod folds;
@@ -21,6 +22,7 @@ mod nesting;
 mod outlying;
 mod overlaps;
 mod parts;
+mod plates;
 mod queries;
 mod walk;
 mod wedges;

@@ -18,6 +18,7 @@ use super::nearest::MOST_VISITS;
 use super::ray::{Crossing, Ray};
 use super::{Bvh, Nearest, Triangles};
 use crate::mesh::MAX_VALENCE;
+use crate::mesh::beside::widest_m;
 use crate::surface::Feature;
 
 impl<const WIDTH: usize> Bvh<WIDTH> {
@@ -62,7 +63,13 @@ impl<const WIDTH: usize> Bvh<WIDTH> {
                 self.for_each_crossing(triangles, &ray, MOST_VISITS, |crossing| crossings.add(crossing));
             match all {
                 Ok(()) if !crossings.is_full() => {
-                    [crossings.exit(BEYOND * self.extent_m()), crossings.first_left()]
+                    let face = |of: &Crossing| &triangles.faces[of.face as usize];
+                    // A crack is as much longer along the ray as that is aslant.
+                    let thin_m = |a: &Crossing, b: &Crossing| match face(a).is_beside && face(b).is_beside {
+                        true => widest_m(self.extent_m()) / face(a).normal_B[ray.axes[2]].abs(),
+                        false => BEYOND * self.extent_m(),
+                    };
+                    [crossings.exit(thin_m), crossings.first_left()]
                         .map(|found| found.map(|at| ray.place(&at)))
                 }
                 _ => [None; 2],
@@ -83,7 +90,10 @@ impl<const WIDTH: usize> Bvh<WIDTH> {
             Feature::Edge | Feature::Vertex => normal_B.dot(&(p_B - nearest.point_B)) <= 0.0,
             _ => true,
         };
-        let beyond_B = nearest.point_B + normal_B * (BEYOND * self.extent_m());
+        let is_beside = triangles.faces[nearest.face as usize].is_beside;
+        // In a crack that no finger feels it is not outside.
+        let beyond_m = if is_beside { widest_m(self.extent_m()) } else { BEYOND * self.extent_m() };
+        let beyond_B = nearest.point_B + normal_B * beyond_m;
         let number = || self.winding_number(triangles, &beyond_B, MOST_VISITS);
         is_behind && number().is_some_and(|number| number <= 0)
     }
@@ -130,15 +140,16 @@ impl Crossings {
         self.count == MOST_CROSSINGS
     }
 
-    /// Behind which the winding number is not positive any more, for more than `thin_m`: where faces lie upon each other,
+    /// Behind which the winding number is not positive any more, for more than `thin_m` of what is left and entered: where faces lie upon each other,
     /// nothing is between them.
-    fn exit(&self, thin_m: f64) -> Option<Crossing> {
+    fn exit(&self, thin_m: impl Fn(&Crossing, &Crossing) -> f64) -> Option<Crossing> {
         let all = &self.all[..self.count];
         let change = |crossing: &Crossing| if crossing.is_leaving { 1 } else { -1 };
         let mut number: i32 = all.iter().map(change).sum();
         (0..all.len()).find_map(|i| {
             number -= change(&all[i]);
-            let has_room = all.get(i + 1).is_none_or(|next| next.ahead_m - all[i].ahead_m > thin_m);
+            let has_room =
+                all.get(i + 1).is_none_or(|next| next.ahead_m - all[i].ahead_m > thin_m(&all[i], next));
             (number <= 0 && all[i].is_leaving && has_room).then_some(all[i])
         })
     }

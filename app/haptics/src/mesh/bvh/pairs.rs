@@ -15,8 +15,11 @@ struct Part {
 }
 
 impl Part {
-    fn overlaps(&self, other: &Self) -> bool {
-        (0..3).all(|axis| self.low[axis] <= other.high[axis] && other.low[axis] <= self.high[axis])
+    fn overlaps(&self, other: &Self, gap: f32) -> bool {
+        let reaches = |low: f32, high: f32| low - gap <= high;
+        (0..3).all(|axis| {
+            reaches(self.low[axis], other.high[axis]) && reaches(other.low[axis], self.high[axis])
+        })
     }
 
     fn faces(&self) -> std::ops::Range<u32> {
@@ -26,9 +29,11 @@ impl Part {
 }
 
 impl<const WIDTH: usize> Bvh<WIDTH> {
-    /// Visits pairs of faces, by their numbers, whose runs have boxes that overlap, each pair once, until `visit` says
+    /// Visits pairs of faces, by their numbers, whose runs have boxes that overlap, or nearly by this gap \[m\], each pair once, until `visit` says
     /// `false`; says whether it never did.
-    pub(in crate::mesh) fn for_each_pair(&self, mut visit: impl FnMut(u32, u32) -> bool) -> bool {
+    pub(in crate::mesh) fn for_each_pair(&self, gap_m: f64, mut visit: impl FnMut(u32, u32) -> bool) -> bool {
+        // Differences of bounds are rounded, too.
+        let gap = if gap_m > 0.0 { (2.0 * gap_m + 1e-6 * self.extent_m()) as f32 } else { 0.0 };
         let root = Part { child: Child::node(0), low: [f32::NEG_INFINITY; 3], high: [f32::INFINITY; 3] };
         let mut waiting = vec![(root, root)];
         while let Some((a, b)) = waiting.pop() {
@@ -44,7 +49,7 @@ impl<const WIDTH: usize> Bvh<WIDTH> {
             for (i, part) in self.parts(&a).iter().enumerate() {
                 let Some(part) = part else { continue };
                 let others = others.iter().skip(if is_same { i } else { 0 }).flatten();
-                waiting.extend(others.filter(|other| part.overlaps(other)).map(|other| (*part, *other)));
+                waiting.extend(others.filter(|other| part.overlaps(other, gap)).map(|other| (*part, *other)));
             }
         }
         true
@@ -87,7 +92,7 @@ mod tests {
                 (0..3).all(|axis| low[axis] <= other_high[axis] && other_low[axis] <= high[axis])
             };
             let mut visited = std::collections::BTreeSet::new();
-            assert!(mesh.bvh.for_each_pair(|i, j| {
+            assert!(mesh.bvh.for_each_pair(0.0, |i, j| {
                 assert!(i != j && visited.insert((i.min(j), i.max(j))), "{i} {j}");
                 true
             }));
@@ -96,7 +101,7 @@ mod tests {
                     assert!(visited.contains(&(i as u32, j as u32)) || !overlap(i, j), "{i} {j}");
                 }
             }
-            assert!(!mesh.bvh.for_each_pair(|_, _| false));
+            assert!(!mesh.bvh.for_each_pair(0.0, |_, _| false));
         }
     }
 }

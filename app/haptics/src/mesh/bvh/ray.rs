@@ -40,7 +40,7 @@ pub(super) struct Ray {
     pub(super) from_B: Vector3<f64>,
     rounded: Rounded,
     /// The two axes across it and the one along it; in this order a right-handed frame.
-    axes: [usize; 3],
+    pub(super) axes: [usize; 3],
     is_upward: bool,
 }
 

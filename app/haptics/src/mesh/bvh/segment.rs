@@ -14,6 +14,13 @@
 //! as close as the tolerance is meant, hence that is what is asked. An end up to the tolerance in front counts as
 //! met: no finger is free where rounding could put it on either side of a sheet.
 //!
+//! A god-object that is let go starts on the surface itself, and knows which side it leaves ([`Leaving`]). There the
+//! tolerance would be a trap: of a plate thinner than that the far side would catch it from within, and hold it for good. So
+//! of a face that lies back to back with one that is left it must not start behind by more than distances from planes are
+//! rounded by, 8 eps of the coordinates ([`ROUNDED`]). Plates that are thicker are told apart by that, and vertices of thinner
+//! ones are merged (`weld.rs`, 16 eps); what is left of those, a fold without any thickness, is not met from the
+//! face on which it lies.
+//!
 //! Cost: a segment that ends far from the mesh or its box visits a few nodes; no bound holds for every segment.
 
 use nalgebra::Vector3;
@@ -22,6 +29,36 @@ use super::closest::closest_on;
 use super::stack::Stack;
 use super::{Bvh, Node, Triangles, larger, smaller};
 use crate::mesh::{Face, Sides};
+
+/// The surface from which a god-object sets out.
+pub(in crate::mesh) trait Leaving {
+    /// Whether it is in a face, not at its rim.
+    fn is_face(&self) -> bool;
+
+    /// Whether a face with this normal, towards the start, behind which that lies by more than rounding but less than the
+    /// tolerance, is the far side of what is left.
+    fn is_far_side(&self, normal_B: &Vector3<f64>) -> bool;
+
+    /// Whether such a face on which the start lies is upon the one that is left, back to back.
+    fn lies_upon(&self, normal_B: &Vector3<f64>) -> bool;
+}
+
+/// Free space.
+struct Nothing;
+
+impl Leaving for Nothing {
+    fn is_face(&self) -> bool {
+        false
+    }
+
+    fn is_far_side(&self, _: &Vector3<f64>) -> bool {
+        false
+    }
+
+    fn lies_upon(&self, _: &Vector3<f64>) -> bool {
+        false
+    }
+}
 
 /// Where a segment meets a mesh.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -60,7 +97,32 @@ impl<const WIDTH: usize> Bvh<WIDTH> {
         to_B: &Vector3<f64>,
         is_skipped: impl Fn(u32) -> bool,
     ) -> Option<Hit> {
-        let segment = &Segment::new(from_B, to_B, sides, self.extent_m());
+        let segment = Segment::new([from_B, to_B], sides, self.extent_m(), (0.0, &Nothing));
+        self.first_met(triangles, &segment, is_skipped)
+    }
+
+    /// As [`Self::first_hit_of_others`], from a point of the surface that is left.
+    pub(in crate::mesh) fn first_hit_in_flight(
+        &self,
+        triangles: Triangles<'_>,
+        [from_B, to_B]: [&Vector3<f64>; 2],
+        leaving: &impl Leaving,
+        is_skipped: impl Fn(u32) -> bool,
+    ) -> Option<Hit> {
+        // A place on a face is rounded as the finger is for which it was computed, one on an edge as its ends are.
+        let size_m = if leaving.is_face() { self.extent_m().max(to_B.amax()) } else { self.extent_m() };
+        let leaving = (ROUNDED * size_m, leaving);
+        let segment = Segment::new([from_B, to_B], Sides::Solid, self.extent_m(), leaving);
+        self.first_met(triangles, &segment, is_skipped)
+    }
+
+    #[inline(always)]
+    fn first_met(
+        &self,
+        triangles: Triangles<'_>,
+        segment: &Segment<'_, impl Leaving>,
+        is_skipped: impl Fn(u32) -> bool,
+    ) -> Option<Hit> {
         let clipped = Clipped::new(segment, &self.lower_B, &self.upper_B)?;
         let line = Line::new(segment.path, clipped.end);
         let slabs = Slabs::new(&clipped);
@@ -94,12 +156,15 @@ impl<const WIDTH: usize> Bvh<WIDTH> {
 }
 
 /// The segment and what its distances from planes are compared with.
-struct Segment {
+struct Segment<'l, L> {
     from: Vector3<f64>,
     to: Vector3<f64>,
     path: Vector3<f64>,
     sides: Sides,
     tolerance_m: f64,
+    /// What distances from planes are rounded by at most.
+    rounded_m: f64,
+    leaving: &'l L,
 }
 
 #[derive(Clone, Copy)]
@@ -109,9 +174,15 @@ struct Met {
     is_front: bool,
 }
 
-impl Segment {
-    fn new(from: &Vector3<f64>, to: &Vector3<f64>, sides: Sides, extent_m: f64) -> Self {
-        Self { from: *from, to: *to, path: to - from, sides, tolerance_m: TOLERANCE * extent_m }
+impl<'l, L: Leaving> Segment<'l, L> {
+    fn new(
+        [from, to]: [&Vector3<f64>; 2],
+        sides: Sides,
+        extent_m: f64,
+        (rounded_m, leaving): (f64, &'l L),
+    ) -> Self {
+        let tolerance_m = TOLERANCE * extent_m;
+        Self { from: *from, to: *to, path: to - from, sides, tolerance_m, rounded_m, leaving }
     }
 
     #[inline]
@@ -126,6 +197,9 @@ impl Segment {
         if !(before >= -self.tolerance_m && after < before && after <= self.tolerance_m) {
             return None;
         }
+        if before <= self.rounded_m && self.leaves_back_to_back(face, is_front, before) {
+            return None;
+        }
         let fraction = (before / (before - after)).clamp(0.0, 1.0);
         // Behind the plane, not quite at it, or in it over the whole length: where the line meets it says nothing.
         let is_vague =
@@ -133,6 +207,17 @@ impl Segment {
         let corners = triangles.corners(face);
         let is_met = if is_vague { self.touches(face, &corners, fraction) } else { line.meets(&corners) };
         is_met.then_some(Met { face: index, fraction, is_front })
+    }
+
+    /// Whether this is the far side of what is left: behind it by more than rounding, or upon it.
+    #[inline(always)]
+    fn leaves_back_to_back(&self, face: &Face, is_front: bool, before: f64) -> bool {
+        let normal_B = if is_front { face.normal_B } else { -face.normal_B };
+        if before < -self.rounded_m {
+            self.leaving.is_far_side(&normal_B)
+        } else {
+            self.leaving.lies_upon(&normal_B)
+        }
     }
 
     /// Whether the face is as near as the tolerance: its plane may be one away, and so may its rim be.
@@ -195,7 +280,7 @@ struct Clipped {
 impl Clipped {
     /// None if nothing of it can meet the box.
     #[inline]
-    fn new(segment: &Segment, lower: &Vector3<f64>, upper: &Vector3<f64>) -> Option<Self> {
+    fn new<L>(segment: &Segment<'_, L>, lower: &Vector3<f64>, upper: &Vector3<f64>) -> Option<Self> {
         let Segment { from, to, path, .. } = segment;
         // Fails for NaN as well.
         if !(path.norm_squared() < f64::MAX && from.norm_squared() < f64::MAX && *path != Vector3::zeros()) {
@@ -293,6 +378,10 @@ impl Slabs {
 
 /// How far behind a face a segment may start, relative to the mesh: a hundred times what rounding can do.
 const TOLERANCE: f64 = 1e-13;
+/// How far behind a face what is on it may be found, relative to the coordinates. The three products of a distance from a plane
+/// are rounded by 2.6 eps at most, those of the plane's own offset by as much; the normal of a well-shaped face, and the place
+/// itself, by two more. Of 320,000 random faces and places it was 2.64 eps at most.
+const ROUNDED: f64 = 8.0 * f64::EPSILON;
 /// Relative to the coordinates from which the clipped ends are computed with a few roundings of 1e-16 each.
 const BOX_PAD: f64 = 1e-12;
 /// 2^-19.
