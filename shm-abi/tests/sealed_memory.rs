@@ -284,6 +284,8 @@ fn an_observer_of_the_same_user_can_spoil_neither_the_memory_nor_the_next_observ
     let memory = DriverMemory::create(&info()).unwrap();
     let file = File::from(memory.fd().try_clone_to_owned().unwrap());
     let path = format!("/proc/self/fd/{}", std::os::fd::AsRawFd::as_raw_fd(&file));
+    // Others cannot open it again, by this path, to fill memory with its attributes.
+    assert_eq!(file.metadata().unwrap().permissions().mode() & 0o777, 0o600);
     let truncated = File::options().write(true).truncate(true).open(&path);
     assert_eq!(truncated.unwrap_err().raw_os_error(), Some(rustix::io::Errno::PERM.raw_os_error()));
     let reopened = File::options().read(true).write(true).open(&path).unwrap();
@@ -310,4 +312,12 @@ fn more_devices_than_a_frame_has_room_for_are_an_error_that_names_the_limit() {
         error.to_string(),
         "there are 9 devices, and a driver can have 8 at most; start a second driver"
     );
+}
+
+#[test]
+fn views_of_one_driver_s_memory_are_told_from_those_of_another_s() {
+    let [one, other] = [(), ()].map(|()| DriverMemory::create(&info()).unwrap());
+    let view = |of: &DriverMemory| DriverView::map(of.fd()).unwrap();
+    assert!(view(&one).is_same_driver(&view(&one)));
+    assert!(!view(&one).is_same_driver(&view(&other)));
 }

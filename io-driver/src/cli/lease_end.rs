@@ -55,3 +55,37 @@ fn has_ended(driver: &DriverView, lease: u64) -> bool {
     }
     true
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use bytemuck::Zeroable;
+    use shm_abi::doorbell::WaitMode;
+    use shm_abi::segment::{ClockMode, DriverInfo};
+    use shm_abi::{DriverMemory, Frame};
+
+    /// The loop hangs, or the machine keeps it from running: what stands there is from before.
+    #[test]
+    fn a_lease_has_ended_once_a_frame_is_of_another_one() {
+        let info = DriverInfo {
+            period_ns: 1_000_000,
+            reply_budget_ns: 500_000,
+            max_command_age_ticks: 4,
+            ramp_in_ticks: 20,
+            ramp_out_ticks: 5,
+            clock_mode: ClockMode::Real,
+            wait_mode: WaitMode::Futex,
+            is_commissioning: false,
+            cpu: None,
+            devices: Vec::new(),
+            setup_report: String::new(),
+        };
+        let memory = DriverMemory::create(&info).expect("memory");
+        let driver = DriverView::map(memory.fd()).expect("our own");
+        for (tick, lease, ended) in [(7, 3, false), (8, 3, false), (9, 0, true), (10, 4, true)] {
+            memory.write_frame(&Frame { tick, lease, ..Frame::zeroed() });
+            memory.ring(tick, None);
+            assert_eq!(has_ended(&driver, 3), ended, "{lease}");
+        }
+    }
+}

@@ -1,7 +1,7 @@
 //! The driver's segment: written by the driver, read by everybody else.
 
 use super::description::{describe, device_count};
-use super::mapping::{Mapping, check, create_memfd, keep_apart, seal};
+use super::mapping::{Mapping, check, close_to_others, create_memfd, keep_apart, seal};
 use super::text::{lines_of, put_text};
 use super::{
     ClockMode, CommanderMemory, CommanderView, DeviceInfo, DriverInfo, SegmentError, bounds, expect,
@@ -53,6 +53,7 @@ impl DriverMemory {
             return Err(SegmentError::TooManyDevices { found: info.devices.len() });
         }
         let fd = create_memfd(c"phantom3-driver", size_of::<DriverSegment>())?;
+        close_to_others(&fd)?;
         let map = Mapping::<DriverSegment>::writable(&fd)?;
         describe(&map, info);
         // After our own mapping stands, nobody gets another writable one.

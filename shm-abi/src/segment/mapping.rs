@@ -25,15 +25,18 @@ pub(super) fn create_memfd(name: &std::ffi::CStr, bytes: usize) -> Result<OwnedF
             other => Err(other),
         })
         .map_err(|errno| SegmentError::System { what: "create", source: errno.into() })?;
-    // Whoever is handed it could open it again by its name in proc(5), and fill memory with attributes of it that nobody
-    // accounts for.
-    rustix::fs::fchmod(&fd, Mode::RUSR | Mode::WUSR)
-        .map_err(|errno| SegmentError::System { what: "close to others", source: errno.into() })?;
     // Not only sized: a page that does not exist yet costs a page fault inside a tick, and SIGBUS if there
     // is no memory left by then.
     rustix::fs::fallocate(&fd, FallocateFlags::empty(), 0, bytes as u64)
         .map_err(|errno| SegmentError::System { what: "reserve the memory of", source: errno.into() })?;
     Ok(fd)
+}
+
+/// Lets nobody else open the file again by its name in proc(5): whoever is handed a descriptor could fill memory with attributes
+/// of the file, which nobody accounts for.
+pub(super) fn close_to_others(fd: &OwnedFd) -> Result<(), SegmentError> {
+    rustix::fs::fchmod(fd, Mode::RUSR | Mode::WUSR)
+        .map_err(|errno| SegmentError::System { what: "close to others", source: errno.into() })
 }
 
 pub(super) fn seal(fd: &OwnedFd, seals: SealFlags) -> Result<(), SegmentError> {

@@ -126,6 +126,19 @@ fn a_driver_that_is_stopped_is_not_taken_for_one_that_obeyed() {
     assert_eq!(driver.wait().code(), Some(0));
 }
 
+#[test]
+fn a_driver_that_is_killed_while_it_is_asked_to_stop_has_not_written_zero() {
+    let driver = Driver::start(&resting("real", 1));
+    signal(&driver, Signal::STOP);
+    let mut asking = Running::start(io_driver().arg("stop").arg("--socket").arg(driver.socket()));
+    asking.hear("it has not stopped within 100 ms: the motors may still be on");
+    signal(&driver, Signal::KILL);
+    let stop = asking.end();
+    assert_eq!(stop.status, Some(3), "{stop:?}");
+    assert!(stop.err.contains("it ended without last words: the motors may still be on"), "{stop:?}");
+    assert!(!stop.err.contains("start it again"), "{stop:?}");
+}
+
 /// Who asked looked at arms that stood still; somebody else continues the driver later.
 #[test]
 fn a_fault_is_not_left_because_somebody_asked_long_ago() {

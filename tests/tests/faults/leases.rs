@@ -205,6 +205,51 @@ fn a_run_whose_lease_somebody_ended_says_so_and_does_not_come_back() {
     }
 }
 
+/// A machine that stalls for some tenths of a second as the lease ends: what is there afterwards is the same driver.
+#[test]
+fn a_run_whose_lease_somebody_ended_does_not_come_back_to_a_driver_that_stood_still_meanwhile() {
+    for pause_ms in [1, 2, 3, 4, 6] {
+        let mut press = Press::start("real");
+        let mut holder = press.start_app();
+        RingLog::begin(&press.observer.driver).follow_to_force(&press.observer.driver);
+        let driver = rustix::process::Pid::from_child(&press.driver.child);
+        let signal = |signal| rustix::process::kill_process(driver, signal).expect("our own child");
+        signal(rustix::process::Signal::STOP);
+        let socket = press.driver.socket().to_path_buf();
+        let asking = std::thread::spawn(move || shm_abi::client::end_lease(&socket, "test"));
+        std::thread::sleep(Duration::from_millis(20));
+        signal(rustix::process::Signal::CONT);
+        // The service thread serves it within a turn of 20 ms; where it stops in between is chance.
+        std::thread::sleep(Duration::from_millis(pause_ms));
+        signal(rustix::process::Signal::STOP);
+        std::thread::sleep(Duration::from_millis(300));
+        signal(rustix::process::Signal::CONT);
+        asking.bounded_join().expect("no panic").expect("it is granted");
+        let end = holder.end();
+        assert_eq!(end.status, Some(3), "{pause_ms}: {end:?}");
+        assert!(end.err.contains("somebody ended this run's lease"), "{pause_ms}: {end:?}");
+        press.driver_must_live();
+    }
+}
+
+/// The request is served by a thread of its own; whether the loop took note, a frame tells.
+#[test]
+fn a_lease_is_not_told_as_ended_before_a_frame_shows_it() {
+    let mut press = Press::start("real");
+    let mut holder = press.start_app();
+    RingLog::begin(&press.observer.driver).follow_to_force(&press.observer.driver);
+    let driver = rustix::process::Pid::from_child(&press.driver.child);
+    let signal = |signal| rustix::process::kill_process(driver, signal).expect("our own child");
+    signal(rustix::process::Signal::STOP);
+    let asked = io_driver(&["end-lease"], press.driver.socket());
+    assert_eq!((asked.status, &*asked.out), (Some(2), ""), "{asked:?}");
+    signal(rustix::process::Signal::CONT);
+    let asked = io_driver(&["end-lease"], press.driver.socket());
+    assert_eq!(asked.status, Some(0), "{asked:?}");
+    assert_eq!(holder.end().status, Some(3));
+    press.driver_must_live();
+}
+
 #[test]
 fn a_commander_that_was_stopped_is_replaced_on_request() {
     let mut press = Press::start("real");
