@@ -160,11 +160,11 @@ pub(crate) fn recording_line(recorded: &Recorded, rows_lost: u64) -> String {
         0 => String::new(),
         lost => format!(", {lost} LOST: {who} was too slow"),
     };
-    let end = if failure.is_some() { " NOT COMPLETE: see the message above" } else { "" };
-    let end = if failure.is_none() && *is_as_before {
-        ": there was no tick, and the file is as it was"
-    } else {
-        end
+    let end = match (failure, is_as_before) {
+        (None, false) => "",
+        (None, true) => ": there was no tick, and the file is as it was",
+        (Some(_), false) => " NOT COMPLETE: see the message above",
+        (Some(_), true) => " NOT WRITTEN: see the message above; the file is as it was",
     };
     format!("recording    {} ({rows} {unit}{lost}){end}", Plain(shown(path).display()))
 }

@@ -5,7 +5,7 @@ use crate::bad_input::run_in_little_memory;
 use patience::prelude::*;
 use std::os::unix::fs::PermissionsExt;
 use std::path::Path;
-use std::process::Command;
+use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
 use system_tests::faults::scarcity::limited;
 use system_tests::workplace::{Running, Said, Workplace};
@@ -114,6 +114,52 @@ fn a_recording_whose_beginning_does_not_fit_leaves_the_earlier_one() {
     assert_eq!(said.status, Some(2), "{}", said.err);
     assert!(said.err.contains("o.mcap: File too large") && said.err.contains("ulimit -f"), "{}", said.err);
     assert!(place.snapshot() == before, "{}", said.err);
+}
+
+/// `None`, which is told: nothing here makes system calls fail.
+fn with_failing(place: &Workplace, calls: &str, arguments: &[&str]) -> Option<Said> {
+    let inject = format!("inject={calls}");
+    let of = |what: &[&str]| {
+        let mut command = place.prepare(Command::new("strace"));
+        command.args(["-f", "-o", "calls.txt", "-e", &inject]).args(what);
+        command
+    };
+    if !of(&["true"]).stderr(Stdio::null()).bounded_status().is_ok_and(|status| status.success()) {
+        eprintln!("skipped: there is no strace that may trace here");
+        return None;
+    }
+    let program = place.phantom3();
+    let program = program.get_program().to_str().expect("a path in letters");
+    Some(Running::start(of(&[&[program], arguments].concat())).wait())
+}
+
+#[test]
+fn an_earlier_recording_that_cannot_be_emptied_is_as_it_was() {
+    let place = workplace();
+    for name in ["o.mcap", "o.csv"] {
+        recorded(&place, "2", &[name]);
+        let before = bytes(&place, name);
+        let arguments = [&RUN[..], &["0.2", "--record", name]].concat();
+        let Some(said) = with_failing(&place, "ftruncate:error=ENOSPC:when=1", &arguments) else { return };
+        // The first may be that of a segment.
+        assert_ne!(said.status, Some(0), "{}", said.err);
+        assert!(bytes(&place, name) == before, "{name}: {}", said.err);
+    }
+}
+
+#[test]
+fn a_table_that_cannot_have_the_rights_of_the_earlier_one_leaves_nothing_beside_it() {
+    let place = workplace();
+    recorded(&place, "0.1", &["r.mcap", "r.csv"]);
+    place.write("o.csv", "earlier");
+    let arguments = ["export", "r.mcap", "o.csv"];
+    let Some(said) = with_failing(&place, "fchmod:error=EPERM", &arguments) else { return };
+    assert_eq!(said.status, Some(0), "{}", said.err);
+    assert!(bytes(&place, "o.csv") == bytes(&place, "r.csv"), "{}", said.err);
+    let names =
+        std::fs::read_dir(place.path("")).expect("ours").map(|entry| entry.expect("ours").file_name());
+    let left: Vec<_> = names.filter(|name| name.to_string_lossy().ends_with(".part")).collect();
+    assert!(left.is_empty(), "{left:?}");
 }
 
 #[test]
