@@ -1,6 +1,6 @@
 //! Which files a run is recorded in: those that were asked for, and beside each one of its own for every other scene.
 
-use super::destination::{is_same_place, is_standard_output};
+use super::destination::{Stream, is_same_place, is_standard_output};
 use super::{
     About, Backpressure, Beginning, Opened, RecordFile, Recorder, View, begin_all, create, create_events,
     create_under_way,
@@ -121,7 +121,7 @@ fn free_place(first: &Path, scene: u32, taken: &[&PathBuf]) -> PathBuf {
     let mut number = scene + 1;
     loop {
         let place = numbered(first, number);
-        if !taken.iter().any(|other| is_same_place(&place, other)) {
+        if !taken.iter().any(|other| is_same_place(&place, other)) && Stream::that_is(&place).is_none() {
             return place;
         }
         number += 1;
