@@ -38,6 +38,8 @@ pub struct Report {
     pub lists: Option<ListsEnd>,
     /// What became of the recordings.
     pub recordings: Vec<Recorded>,
+    /// Inputs of the run that are in none of them, each with the reason.
+    pub left_out: Vec<String>,
     /// What became of the pictures, if any were wanted.
     pub pictures: Option<Drawn>,
 }
@@ -148,7 +150,11 @@ impl fmt::Display for Report {
         }
         let lines: Vec<String> =
             self.recordings.iter().map(|recorded| recording_line(recorded, tally.rows_lost)).collect();
-        write!(f, "{}", lines.join("\n"))
+        write!(f, "{}", lines.join("\n"))?;
+        for input in &self.left_out {
+            write!(f, "\n             without {}", Plain(input))?;
+        }
+        Ok(())
     }
 }
 

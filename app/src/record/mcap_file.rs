@@ -15,6 +15,7 @@
 //! Invariant: what could not be written as a whole is cut off again; after that nothing more is written, not even an end.
 
 use super::about::{self, About};
+use super::destination::shown;
 use super::event_line::{holders, name, said};
 use super::foxglove;
 use super::opened::Opened;
@@ -27,6 +28,7 @@ use crate::columns::Names;
 use crate::recording::RecordingError;
 use crate::row::{BodyRow, Row};
 use io_driver::device::run_time_s;
+use io_driver::say::say;
 use mcap::records::{MessageHeader, Metadata};
 use mcap::write::NoSeek;
 use mcap::{Attachment, Compression, McapError, WriteOptions, Writer};
@@ -128,6 +130,9 @@ impl McapFile {
         let writes = WholeWrites::new(file, Arc::clone(&beginning));
         let mut writer = options().create(NoSeek::new(writes)).map_err(failed)?;
         let channels = begin(&mut writer, &names, about).map_err(failed)?;
+        for (input, why) in about.left_out() {
+            say(format_args!("phantom3: {} is recorded without {input}: {why}", shown(&path).display()));
+        }
         let mut file = Self {
             writer,
             beginning,
