@@ -83,6 +83,19 @@ pub enum RecordingError {
 }
 
 impl RecordingError {
+    /// The file that it is about.
+    pub fn file(&self) -> &Path {
+        match self {
+            Self::Create { file, .. }
+            | Self::NoThread { file, .. }
+            | Self::Claimed { file }
+            | Self::Removed { file, .. }
+            | Self::NotBegun { file, .. }
+            | Self::Write { file, .. } => file,
+            Self::Format(FormatError::Unknown { file, .. } | FormatError::ParquetOfRun { file, .. }) => file,
+        }
+    }
+
     /// Whether nobody reads the standard output any more: who has seen enough is no failure.
     pub fn is_of_a_reader_who_left(&self) -> bool {
         let is_pipe = |file: &Path| file == shown(Path::new(STANDARD_OUTPUT));

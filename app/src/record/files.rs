@@ -59,11 +59,9 @@ impl Files {
         }
     }
 
-    /// Those of the scene of this number, after the first. On the standard output a table has one header, which is that of the first scene.
-    ///
-    /// # Errors
-    /// If one cannot be made.
-    pub fn of_scene(&mut self, rig: &Rig, view: &View, number: u32) -> Result<Vec<Recorder>, RecordingError> {
+    /// Those of the scene of this number, after the first, or why one cannot be made, which keeps none of the others. On the
+    /// standard output a table has one header, which is that of the first scene.
+    pub fn of_scene(&mut self, rig: &Rig, view: &View, number: u32) -> Vec<Result<Recorder, RecordingError>> {
         let (streams, files): (Vec<_>, Vec<_>) =
             self.record.clone().into_iter().partition(|path| is_standard_output(path));
         if !streams.is_empty() {

@@ -54,6 +54,14 @@ pub struct Recorded {
     pub is_as_before: bool,
 }
 
+impl Recorded {
+    /// A recording for which there is no file; nothing of it was written anywhere.
+    pub fn not_begun(error: &RecordingError) -> Self {
+        let (path, failure) = (error.file().into(), Some(error.to_string()));
+        Self { path, rows: 0, unit: "rows", lost: 0, failure, is_as_before: true }
+    }
+}
+
 /// Hands events to a recording, as [`Recorder::send`] does rows.
 pub struct EventFeed {
     events: EventSender,
