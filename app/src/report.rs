@@ -53,7 +53,7 @@ impl Report {
     /// Whether a recording is not complete, or a picture could not be written, which has been told. In real time rows may
     /// be left out; no other clock leaves out any.
     pub fn lacks_a_recording(&self) -> bool {
-        let lacks_pictures = self.pictures.as_ref().is_some_and(|drawn| drawn.is_fault);
+        let lacks_pictures = self.pictures.as_ref().is_some_and(|drawn| drawn.failure.is_some());
         let has_waited = self.timing.is_none();
         let is_whole = |recorded: &Recorded| {
             recorded.failure.is_none() && !(has_waited && recorded.lost + self.tally.rows_lost > 0)

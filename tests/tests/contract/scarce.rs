@@ -273,6 +273,39 @@ fn pictures_for_which_there_is_too_little_memory_or_are_too_few_threads_are_a_fa
     }
 }
 
+#[test]
+fn pictures_without_a_graphics_library_are_a_fault_and_the_run_goes_to_its_end() {
+    let place = workplace();
+    // No library, though it is called so.
+    place.write("libEGL.so.1", "");
+    let mut program = place.phantom3();
+    program.args(RUN).args(["0.1", "--snapshot", "0.05:p.png", "--record", "o.csv"]);
+    program.env("LD_LIBRARY_PATH", place.path(""));
+    let said = Running::start(program).wait();
+    assert_eq!(said.status, Some(3), "{}{}", said.out, said.err);
+    assert!(said.err.contains("no pictures: ") && said.err.contains("apt install libegl1"), "{}", said.err);
+    assert!(said.out.contains("pictures     0, 1 MISSING NOT COMPLETE"), "{}", said.out);
+    assert!(said.out.contains("o.csv (100 rows)"), "{}", said.out);
+}
+
+#[test]
+fn pictures_for_which_too_few_files_may_be_open_are_told_with_the_limit() {
+    let place = workplace();
+    let picture = [&RUN[..], &["0.1", "--snapshot", "0.05:p.png"]].concat();
+    if place.run(&picture).err.contains("no pictures: ") {
+        eprintln!("skipped: this machine cannot draw");
+        return;
+    }
+    let files = ["--record", "1.mcap", "--record", "2.csv", "--record", "3.csv"];
+    for descriptors in 7..20 {
+        let limit = format!("-n {descriptors}");
+        let said = run_limited(&place, &limit, &[&picture[..], &files].concat());
+        assert!(!said.err.contains("apt install"), "{descriptors}: {}", said.err);
+        let is_told = said.status == Some(0) || said.err.contains("ulimit -n") || said.status == Some(127);
+        assert!(is_told, "{descriptors}: {}", said.err);
+    }
+}
+
 /// A full disk takes the layout and not the figure.
 #[test]
 fn a_calibration_whose_figure_does_not_fit_says_that_the_layout_is_written() {
