@@ -2,7 +2,8 @@
 
 use crate::outcome::RunFailure;
 use crate::record::destination::{
-    EventFormat, FormatError, RunFormat, is_same_file, is_same_place, place_of, shown,
+    EventFormat, FormatError, RunFormat, STANDARD_OUTPUT, Stream, is_same_file, is_same_place,
+    is_standard_output, place_of, shown,
 };
 use io_driver::print::print_for;
 use rt_core::plain_text::PlainLines;
@@ -113,11 +114,13 @@ fn is_frame_in(directory: &Path, file: &Path) -> bool {
         && place.parent() == Some(&place_of(directory))
 }
 
-/// Refuses outputs that would overwrite an input or one another, or whose names say no format.
+/// Refuses outputs that would overwrite an input or one another, or whose names say no format; the standard output, where
+/// a report goes if nothing else does, is one of them.
 ///
 /// # Errors
 /// The first that is wrong, with what to do.
 pub(crate) fn check(outputs: &[Output<'_>], inputs: &[&PathBuf]) -> Result<(), RunFailure> {
+    check_standard_output(inputs)?;
     for (index, output) in outputs.iter().enumerate() {
         let Output { option, file, .. } = output;
         let place = file.display();
@@ -131,9 +134,35 @@ pub(crate) fn check(outputs: &[Output<'_>], inputs: &[&PathBuf]) -> Result<(), R
         if let Some(other) = outputs[..index].iter().find(|other| other.meets(output)) {
             return refused_twice(other, output);
         }
+        refuse_stream(output)?;
         output.format().or_else(|error| refused(format_args!("{option} {error}")))?;
     }
     Ok(())
+}
+
+/// A shell may have led it into a file that is read.
+fn check_standard_output(inputs: &[&PathBuf]) -> Result<(), RunFailure> {
+    let is_replaced = |input: &&&PathBuf| {
+        // What stands for the standard output stands for the standard input here.
+        let is_stream = input.as_os_str() == STANDARD_OUTPUT;
+        if is_stream { Stream::Output.is_also(Stream::Input) } else { Stream::Output.is(input) }
+    };
+    let Some(input) = inputs.iter().find(is_replaced) else { return Ok(()) };
+    let input = input.display();
+    refused(format_args!("the standard output would overwrite the input {input}; send it to another file"))
+}
+
+/// What a shell has led into the same file would be written or read there, too.
+fn refuse_stream(Output { option, file, kind }: &Output<'_>) -> Result<(), RunFailure> {
+    if is_standard_output(file) || *kind == Kind::Film {
+        return Ok(());
+    }
+    let Some(stream) = Stream::that_is(file) else { return Ok(()) };
+    let (place, verb) = (file.display(), if stream == Stream::Input { "comes from" } else { "goes to" });
+    refused(format_args!(
+        "{option} {place} is the file that {} {verb}; each needs a file of its own",
+        stream.name()
+    ))
 }
 
 fn refused_twice(first: &Output<'_>, second: &Output<'_>) -> Result<(), RunFailure> {

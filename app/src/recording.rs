@@ -55,6 +55,17 @@ pub enum RecordingError {
         /// Rows that were in it.
         rows: u64,
     },
+    /// Its first piece would not fit.
+    #[error(
+        "cannot write the recording {file}: {}; the run goes on without it, and what was in the file is as it was",
+        rt_core::limits::with_remedy(.source)
+    )]
+    NotBegun {
+        /// Which.
+        file: PathBuf,
+        /// What the system said.
+        source: io::Error,
+    },
     /// It cannot be written any further.
     #[error(
         "cannot write the recording {file}: {source}; the run goes on without it; it is complete up to t = {until_s} s ({rows} rows)"
@@ -72,6 +83,19 @@ pub enum RecordingError {
 }
 
 impl RecordingError {
+    /// The file that it is about.
+    pub fn file(&self) -> &Path {
+        match self {
+            Self::Create { file, .. }
+            | Self::NoThread { file, .. }
+            | Self::Claimed { file }
+            | Self::Removed { file, .. }
+            | Self::NotBegun { file, .. }
+            | Self::Write { file, .. } => file,
+            Self::Format(FormatError::Unknown { file, .. } | FormatError::ParquetOfRun { file, .. }) => file,
+        }
+    }
+
     /// Whether nobody reads the standard output any more: who has seen enough is no failure.
     pub fn is_of_a_reader_who_left(&self) -> bool {
         let is_pipe = |file: &Path| file == shown(Path::new(STANDARD_OUTPUT));
@@ -94,7 +118,8 @@ pub struct Recording {
 }
 
 impl Recording {
-    /// Creates the file and writes the header; a file that is there keeps its content until the first row.
+    /// Creates the file and writes the header; a file that is there keeps its content until the first
+    /// rows.
     ///
     /// # Errors
     /// If the file cannot be made or its first line not be written.
@@ -113,9 +138,9 @@ impl Recording {
         Ok(Self { lines, path, names, period_ns })
     }
 
-    /// Whether the file has its earlier content still.
-    pub fn has_content(&self) -> bool {
-        self.lines.has_content()
+    /// No row has come, and the file has its earlier content.
+    pub fn is_as_before(&self) -> bool {
+        self.lines.is_as_before()
     }
 
     /// Where it lies.
@@ -166,6 +191,9 @@ impl Recording {
     }
 
     fn failed(&self, source: io::Error) -> RecordingError {
+        if self.lines.has_content() {
+            return RecordingError::NotBegun { file: self.path.clone(), source };
+        }
         let until_s = run_time_s(self.lines.last_tick().cast_signed(), self.period_ns);
         RecordingError::Write { file: self.path.clone(), source, until_s, rows: self.lines.rows() }
     }

@@ -38,6 +38,8 @@ pub struct Report {
     pub lists: Option<ListsEnd>,
     /// What became of the recordings.
     pub recordings: Vec<Recorded>,
+    /// Inputs of the run that are in none of them, each with the reason.
+    pub left_out: Vec<String>,
     /// What became of the pictures, if any were wanted.
     pub pictures: Option<Drawn>,
 }
@@ -51,7 +53,7 @@ impl Report {
     /// Whether a recording is not complete, or a picture could not be written, which has been told. In real time rows may
     /// be left out; no other clock leaves out any.
     pub fn lacks_a_recording(&self) -> bool {
-        let lacks_pictures = self.pictures.as_ref().is_some_and(|drawn| drawn.is_fault);
+        let lacks_pictures = self.pictures.as_ref().is_some_and(|drawn| drawn.failure.is_some());
         let has_waited = self.timing.is_none();
         let is_whole = |recorded: &Recorded| {
             recorded.failure.is_none() && !(has_waited && recorded.lost + self.tally.rows_lost > 0)
@@ -148,7 +150,11 @@ impl fmt::Display for Report {
         }
         let lines: Vec<String> =
             self.recordings.iter().map(|recorded| recording_line(recorded, tally.rows_lost)).collect();
-        write!(f, "{}", lines.join("\n"))
+        write!(f, "{}", lines.join("\n"))?;
+        for input in &self.left_out {
+            write!(f, "\n             without {}", Plain(input))?;
+        }
+        Ok(())
     }
 }
 
@@ -160,11 +166,11 @@ pub(crate) fn recording_line(recorded: &Recorded, rows_lost: u64) -> String {
         0 => String::new(),
         lost => format!(", {lost} LOST: {who} was too slow"),
     };
-    let end = if failure.is_some() { " NOT COMPLETE: see the message above" } else { "" };
-    let end = if failure.is_none() && *is_as_before {
-        ": there was no tick, and the file is as it was"
-    } else {
-        end
+    let end = match (failure, is_as_before) {
+        (None, false) => "",
+        (None, true) => ": there was no tick, and the file is as it was",
+        (Some(_), false) => " NOT COMPLETE: see the message above",
+        (Some(_), true) => " NOT WRITTEN: see the message above; the file is as it was",
     };
     format!("recording    {} ({rows} {unit}{lost}){end}", Plain(shown(path).display()))
 }

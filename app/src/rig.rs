@@ -7,6 +7,7 @@ mod effects;
 mod entities;
 mod error;
 mod face_labels;
+mod file_version;
 mod material;
 mod models;
 mod moving;
@@ -17,6 +18,7 @@ mod solids;
 use self::devices::check_hand;
 use self::entities::is_only_seen;
 pub use self::error::RigError;
+use self::file_version::FileVersion;
 use self::material::Unfit;
 use self::models::Models;
 pub use self::moving::Passing;
@@ -36,7 +38,9 @@ use io_driver::open::open_devices;
 use nalgebra::{Isometry3, Vector3};
 use physics::{Aabb, Body, BroadPhase};
 use shm_abi::segment::ClockMode;
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 use world::{FacesSpec, FrictionSpec, Layout, Scene, SceneEntity, SceneFinger, Settings, ShapeSpec};
 
 /// A day (s): longer runs are asked for by repeating them.
@@ -61,6 +65,8 @@ pub struct Rig {
     bases: Vec<Isometry3<f64>>,
     models: Models,
     pictures: Pictures,
+    /// The files of both, before they were read.
+    versions: BTreeMap<PathBuf, FileVersion>,
 }
 
 /// How the hand moves the devices that are not real.
@@ -78,6 +84,8 @@ pub enum HandMode {
 pub struct HandFile {
     /// Where it lies; absolute, since the driver reads it too.
     pub path: PathBuf,
+    /// Its content.
+    pub bytes: Arc<[u8]>,
     /// Its duration (s).
     pub duration_s: f64,
     /// Number of its rows.
@@ -121,8 +129,10 @@ impl Rig {
         };
         let hand = named.map(|(path, named_by)| check_hand(path, &named_by, &scene)).transpose();
         let hand = problems.keep(hand);
+        let version = |file: &PathBuf| Some((file.clone(), FileVersion::of(file)?));
         let mut rig = Self {
             scene_file: scene_file.into(),
+            versions: model_files(&scene).filter_map(version).collect(),
             models: Models::load(&scene, problems),
             pictures: Pictures::load(&scene, problems),
             scene,
@@ -267,11 +277,12 @@ impl Rig {
 
     /// The model and picture files that it is made of.
     pub fn model_files(&self) -> impl Iterator<Item = &PathBuf> {
-        let models = self.scene.entities.iter().filter_map(|entity| match &entity.shape {
-            ShapeSpec::Mesh(model) | ShapeSpec::Nurbs(model) => Some(&model.file),
-            _ => None,
-        });
-        models.chain(self.scene.entities.iter().filter_map(|entity| Some(&entity.height_map.as_ref()?.file)))
+        model_files(&self.scene)
+    }
+
+    /// Whether such a file is not what was read of it any more.
+    pub fn has_changed(&self, model_file: &Path) -> bool {
+        self.versions.get(model_file).copied() != FileVersion::of(model_file)
     }
 
     /// All files that it consists of, also those that this run does not read: nothing is written into them.
@@ -302,6 +313,14 @@ impl Rig {
     fn not_available(&self, what: String) -> RigError {
         RigError::NotAvailable { file: self.scene_file.clone(), what }
     }
+}
+
+fn model_files(scene: &Scene) -> impl Iterator<Item = &PathBuf> {
+    let models = scene.entities.iter().filter_map(|entity| match &entity.shape {
+        ShapeSpec::Mesh(model) | ShapeSpec::Nurbs(model) => Some(&model.file),
+        _ => None,
+    });
+    models.chain(scene.entities.iter().filter_map(|entity| Some(&entity.height_map.as_ref()?.file)))
 }
 
 /// The friction that this says.

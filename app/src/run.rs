@@ -14,6 +14,7 @@ use crate::outcome::{RunFailure, Stop, no_thread};
 use crate::outputs::{self, Output};
 use crate::premises::Premises;
 use crate::progress::Progress;
+use crate::record::destination::RunFormat;
 use crate::record::{About, Files, Recorded, View};
 use crate::report::{Report, recording_line};
 use crate::rig::{HandMode, Rig, RigError};
@@ -250,6 +251,7 @@ fn run_virtual(rig: &Rig, plan: &RunPlan, signals: &StopSignals) -> Result<(Repo
         events,
         orders: plan.orders.as_ref().map(|_| fast.orders()),
         lists: fast.step_mut().end_lists(None),
+        left_out: left_out(plan, &about),
         recordings,
         pictures,
     };
@@ -306,10 +308,19 @@ fn run_two_processes(rig: &Rig, plan: &RunPlan, signals: &StopSignals) -> Result
         events,
         orders: plan.orders.as_ref().map(|_| end.orders),
         lists: end.lists,
+        left_out: left_out(plan, &about),
         recordings,
         pictures,
     };
     Ok((report, end.stop))
+}
+
+/// What a recording that is to have all inputs of the run lacks of them.
+fn left_out(plan: &RunPlan, about: &About) -> Vec<String> {
+    if !plan.record.iter().any(|file| RunFormat::of(file) == Ok(RunFormat::Mcap)) {
+        return Vec::new();
+    }
+    about.left_out().map(|(input, why)| format!("{input}: {why}")).collect()
 }
 
 /// There is no report of a run that a fault ended, but what it recorded is there.

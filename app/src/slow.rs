@@ -249,32 +249,21 @@ impl SlowSide {
         let Some(files) = self.files.as_mut().filter(|files| !files.record.is_empty()) else {
             return Vec::new();
         };
-        match files.of_scene(&coming.rig, &coming.view, self.scenes) {
-            Ok(begun) => {
-                for recorder in &begun {
-                    let scene = coming.rig.scene_file.display();
-                    say(format_args!(
-                        "phantom3: {scene} goes on; it is recorded in {}",
-                        recorder.path().display()
-                    ));
+        let mut begun = Vec::new();
+        for recorder in files.of_scene(&coming.rig, &coming.view, self.scenes) {
+            match recorder {
+                Ok(recorder) => {
+                    let (scene, path) = (coming.rig.scene_file.display(), recorder.path().display());
+                    say(format_args!("phantom3: {scene} goes on; it is recorded in {path}"));
+                    begun.push(recorder);
                 }
-                begun
-            }
-            Err(error) => {
-                say(format_args!("phantom3: {error}"));
-                let path = files.record[0].clone();
-                let failure = Some(error.to_string());
-                self.failed.push(Recorded {
-                    path,
-                    rows: 0,
-                    unit: "rows",
-                    lost: 0,
-                    failure,
-                    is_as_before: false,
-                });
-                Vec::new()
+                Err(error) => {
+                    say(format_args!("phantom3: {error}"));
+                    self.failed.push(Recorded::not_begun(&error));
+                }
             }
         }
+        begun
     }
 
     /// Of a run that did not begin: its files are as they were.

@@ -5,7 +5,7 @@
 //! a recording are: the first wait in vain is the last, pictures behind it are missing, and that is a fault. In real time
 //! nobody waits for drawing: pictures of a film that are due while the thread is busy are left out, and counted; single
 //! pictures, as many as were asked for at most, are kept until there is room. A machine that cannot draw says so once, and
-//! the run goes on.
+//! the run goes on to its end, which is then that of a fault.
 
 mod args;
 
@@ -80,10 +80,8 @@ pub struct Drawn {
     pub not_reached: usize,
     /// Pictures that a fault cost.
     pub missing: u64,
-    /// What went wrong, which has been told.
+    /// What went wrong, which has been told: a file that could not be written, a limit, a machine that cannot draw.
     pub failure: Option<String>,
-    /// Whether that is a file that could not be written, or a limit, rather than a machine that cannot draw.
-    pub is_fault: bool,
 }
 
 impl std::fmt::Display for Drawn {
@@ -263,10 +261,9 @@ impl Snapshots {
         }
         drop(self.out.take());
         let drawn = self.thread.take().map_or_else(Drawn::default, |thread| self.wait_for(thread));
-        let is_fault = drawn.is_fault || self.given_up.is_some();
-        let missing = if is_fault { self.asked.saturating_sub(drawn.written) } else { 0 };
         let failure = self.given_up.or(drawn.failure);
-        Drawn { left_out: self.left_out, not_reached: self.shots.len(), missing, failure, is_fault, ..drawn }
+        let missing = if failure.is_some() { self.asked.saturating_sub(drawn.written) } else { 0 };
+        Drawn { left_out: self.left_out, not_reached: self.shots.len(), missing, failure, ..drawn }
     }
 
     fn wait_for(&mut self, thread: JoinHandle<Drawn>) -> Drawn {
@@ -284,7 +281,7 @@ impl Snapshots {
             let failure = "the drawing ended by itself".to_owned();
             say(format_args!("phantom3: {failure}; pictures behind it are missing"));
             let written = self.written.load(Ordering::Relaxed);
-            Drawn { written, failure: Some(failure), is_fault: true, ..Drawn::default() }
+            Drawn { written, failure: Some(failure), ..Drawn::default() }
         })
     }
 }
@@ -307,16 +304,14 @@ struct Drawer {
 }
 
 impl Drawer {
-    /// Or what is missing, and whether a machine that can draw is kept from it.
-    fn new(stage: &Stage, wanted: &Wanted) -> Result<Self, (String, bool)> {
+    /// Or what is missing.
+    fn new(stage: &Stage, wanted: &Wanted) -> Result<Self, String> {
         for line in &stage.not_drawn {
             say(format_args!("phantom3: not in pictures: {line}"));
         }
         let camera = camera_of(stage, wanted.camera.as_deref()).or_else(|_| camera_of(stage, None));
-        let camera = camera.map_err(|missing| (missing, false))?;
-        let studio = Studio::new(stage, wanted.size);
-        let studio = studio.map_err(|missing| (missing.to_string(), missing.is_of_a_limit()))?;
-        Ok(Self { studio, camera, eyes: wanted.eyes })
+        let studio = Studio::new(stage, wanted.size).map_err(|missing| missing.to_string())?;
+        Ok(Self { studio, camera: camera?, eyes: wanted.eyes })
     }
 }
 
@@ -339,9 +334,9 @@ fn draw_all(
                     drawer = Some(made);
                     steps.take();
                 }
-                Err((missing, is_fault)) => {
+                Err(missing) => {
                     say(format_args!("phantom3: {missing}"));
-                    (drawn.failure, drawn.is_fault) = (Some(missing), is_fault);
+                    drawn.failure = Some(missing);
                     // Nobody is to wait for room.
                     work.iter().for_each(drop);
                     return drawn;
@@ -373,7 +368,7 @@ impl Drawn {
         if self.failure.is_none() {
             say(format_args!("phantom3: the picture {} cannot be written: {error}", file.display()));
         }
-        (self.failure, self.is_fault) = (Some(error.to_string()), true);
+        self.failure = Some(error.to_string());
     }
 }
 
@@ -430,7 +425,7 @@ mod tests {
         drop(turn);
         let drawn = snapshots.finish();
         assert_eq!((drawn.written, drawn.missing, drawn.left_out), (room, 10, 0), "{drawn:?}");
-        assert!(drawn.is_fault && drawn.failure.is_some(), "{drawn:?}");
+        assert!(drawn.failure.is_some(), "{drawn:?}");
         assert_eq!(drawn.to_string(), "4, 10 MISSING NOT COMPLETE: see the message above");
     }
 
@@ -447,7 +442,7 @@ mod tests {
         }
         let drawn = snapshots.finish();
         assert_eq!((drawn.written, drawn.left_out, drawn.missing), (52, 58, 0), "{drawn:?}");
-        assert!(!drawn.is_fault, "{drawn:?}");
+        assert!(drawn.failure.is_none(), "{drawn:?}");
     }
 
     #[test]
@@ -457,7 +452,7 @@ mod tests {
         let drawn = snapshots.finish();
         drop(turn);
         assert_eq!((drawn.written, drawn.missing, drawn.not_reached), (0, 20, 0), "{drawn:?}");
-        assert!(drawn.is_fault && drawn.failure.is_some(), "{drawn:?}");
+        assert!(drawn.failure.is_some(), "{drawn:?}");
     }
 
     #[test]
@@ -476,6 +471,6 @@ mod tests {
         look(&mut snapshots, 0..50);
         let drawn = snapshots.finish();
         assert_eq!((drawn.written, drawn.missing), (3, 47), "{drawn:?}");
-        assert!(drawn.is_fault && drawn.failure.is_some(), "{drawn:?}");
+        assert!(drawn.failure.is_some(), "{drawn:?}");
     }
 }

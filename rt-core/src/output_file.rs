@@ -2,7 +2,7 @@
 //!
 //! Problem: opening a FIFO for writing waits for a reader, for ever if nobody reads it.
 //! Model: opening never waits (`O_NONBLOCK`, which regular files ignore): a pipe that nobody reads is refused, with what
-//! to do. Writing does wait, as everybody expects of a pipe. Who fills a regular file for long claims it ([`claim`]), so
+//! to do, and so is a socket, which no name opens. Writing does wait, as everybody expects of a pipe. Who fills a regular file for long claims it ([`claim`]), so
 //! that two processes do not write over one another.
 
 use crate::sys::inherited;
@@ -10,7 +10,7 @@ use nix::errno::Errno;
 use nix::fcntl::{FcntlArg, OFlag, fcntl};
 use std::fs::{File, OpenOptions, TryLockError};
 use std::io;
-use std::os::unix::fs::{MetadataExt, OpenOptionsExt};
+use std::os::unix::fs::{FileTypeExt, MetadataExt, OpenOptionsExt};
 use std::path::Path;
 
 /// Makes the file, or empties it.
@@ -27,7 +27,7 @@ pub fn create(path: &Path) -> io::Result<File> {
 /// What the system says; a pipe without a reader.
 pub fn open(path: &Path, options: &OpenOptions) -> io::Result<File> {
     let flags = (OFlag::O_NONBLOCK | OFlag::O_NOCTTY).bits();
-    let file = options.clone().custom_flags(flags).open(path).map_err(in_words)?;
+    let file = options.clone().custom_flags(flags).open(path).map_err(|error| in_words(error, path))?;
     let flags = OFlag::from_bits_retain(fcntl(&file, FcntlArg::F_GETFL)?);
     fcntl(&file, FcntlArg::F_SETFL(flags - OFlag::O_NONBLOCK))?;
     Ok(file)
@@ -67,11 +67,16 @@ pub fn standard_output_was_closed() -> bool {
     inherited::output_was_closed()
 }
 
-fn in_words(error: io::Error) -> io::Error {
-    if error.raw_os_error() == Some(Errno::ENXIO as i32) {
-        return io::Error::other("nobody reads this pipe (start its reader first), or its device is gone");
+fn in_words(error: io::Error, path: &Path) -> io::Error {
+    if error.raw_os_error() != Some(Errno::ENXIO as i32) {
+        return error;
     }
-    error
+    if path.metadata().is_ok_and(|found| found.file_type().is_socket()) {
+        return io::Error::other(
+            "it is a socket, which cannot be written by its name; name a file or a pipe",
+        );
+    }
+    io::Error::other("nobody reads this pipe (start its reader first), or its device is gone")
 }
 
 #[cfg(test)]
@@ -91,6 +96,19 @@ mod tests {
         let (_reader, file) = (reader.expect("a reader"), file.expect("somebody reads it"));
         let flags = fcntl(&file, FcntlArg::F_GETFL).expect("flags");
         assert!(!OFlag::from_bits_retain(flags).contains(OFlag::O_NONBLOCK));
+    }
+
+    #[test]
+    fn a_socket_is_called_so_whether_or_not_somebody_listens() {
+        let path = std::env::temp_dir().join(format!("output-file-socket-{}", std::process::id()));
+        let listener = std::os::unix::net::UnixListener::bind(&path).expect("a socket in TMPDIR");
+        let heard = create(&path).map(drop).map_err(|error| error.to_string());
+        drop(listener);
+        let unheard = create(&path).map(drop).map_err(|error| error.to_string());
+        std::fs::remove_file(&path).expect("our own");
+        for refused in [heard, unheard] {
+            assert!(refused.is_err_and(|words| words.starts_with("it is a socket")));
+        }
     }
 
     #[test]

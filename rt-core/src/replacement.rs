@@ -203,10 +203,15 @@ fn create_beside(place: &Path, rights: Option<&Permissions>) -> io::Result<(File
         let beside = place.with_file_name(hidden);
         match OpenOptions::new().write(true).create_new(true).mode(0o666).open(&beside) {
             Ok(file) => {
-                if let Some(rights) = rights {
-                    file.set_permissions(rights.clone())?;
-                }
-                return Ok((file, beside));
+                let given = rights.map_or(Ok(()), |rights| file.set_permissions(rights.clone()));
+                return match given {
+                    Ok(()) => Ok((file, beside)),
+                    Err(error) => {
+                        // It cannot take the place of the other one, and nobody else would remove it.
+                        let _ = std::fs::remove_file(&beside);
+                        Err(error)
+                    }
+                };
             }
             // Left by another process of this number.
             Err(error) if error.kind() == io::ErrorKind::AlreadyExists => {}

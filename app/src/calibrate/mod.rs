@@ -15,7 +15,7 @@ mod layout_file;
 mod live;
 mod report;
 
-use crate::record::destination::is_same_file;
+use crate::record::destination::{is_same_file, is_same_place};
 use calibration::{Calibration, CalibrationError, Fit, Model, Pair, PairsError, calibrate, parse_pairs};
 use clap::builder::{OsStringValueParser, TypedValueParser};
 use clap::{ArgGroup, Args};
@@ -312,7 +312,7 @@ fn refuse_same_file(args: &CalibrateArgs, write: Option<&Path>) -> Result<(), Ca
     for (index, (b, file)) in all.iter().enumerate() {
         for (a, other) in &all[..index] {
             let may_be_edited = (*a, *b) == ("layout", "write");
-            if !may_be_edited && (file == other || is_same_file(file, other)) {
+            if !may_be_edited && (file == other || is_same_place(file, other)) {
                 return Err(CalibrateFailure::SameFile { a, b, file: file.to_path_buf() });
             }
         }

@@ -177,6 +177,9 @@ impl Ended {
             Self::Csv(RecordingError::Write { file, source, rows, .. }) => {
                 format!("cannot write {}: {source}; it is complete up to its row {rows}", file.display())
             }
+            Self::Csv(RecordingError::NotBegun { file, source }) => {
+                format!("cannot write {}: {source}; what was there is as it was", file.display())
+            }
             Self::Csv(error) => error.to_string(),
             Self::Parquet(error) => {
                 let left = if is_beside { NOTHING_LEFT } else { "what is there is of no use" };

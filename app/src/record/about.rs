@@ -1,7 +1,8 @@
 //! What a recording tells of the run that it is of: with what it was made, and everything to play it again.
 //!
-//! Model: facts are words under a name. Files are the run's inputs as they were: the scene, the hand, the layout, and the
-//! models and pictures that the scene names, each under the path that the scene resolves to.
+//! Model: facts are words under a name. Files are the run's inputs as they were: the scene and the hand as they were
+//! parsed, the models and pictures that the scene names as they are read again, each under the path that the scene
+//! resolves to. One that has changed since, or cannot be read, is left out, which is a fact and is told.
 //! Invariant: nothing here depends on the time of day or on where outputs go, unless the clock is not virtual; so equal
 //! inputs give equal recordings.
 
@@ -22,6 +23,8 @@ const FOLLOWS: &str = "follows";
 /// The facts of a recording that was asked for while the run went on: its first tick, and what had been ordered before.
 const BEGINS_TICK: &str = "begins_tick";
 const ORDERED_BEFORE: &str = "ordered_before";
+/// Facts that begin so say why a file is not here.
+const LEFT_OUT: &str = "left out: ";
 
 /// More than this of models and pictures is not put into a recording.
 const MOST_MODEL_BYTES: u64 = 64 << 20;
@@ -90,7 +93,7 @@ impl About {
     #[must_use]
     pub fn followed_by(&self, rig: &Rig, recording: &Path) -> Self {
         let mut next = Self { facts: self.facts.clone(), files: Vec::new() };
-        next.facts.retain(|name, _| !name.starts_with("left out: "));
+        next.facts.retain(|name, _| !name.starts_with(LEFT_OUT));
         next.tell("scene", rig.scene_file.display().to_string());
         next.tell("scene_name", rig.scene.name.clone());
         let first = recording.file_name().unwrap_or_default().to_string_lossy();
@@ -129,13 +132,20 @@ impl About {
         self.facts.insert(name.into(), fact);
     }
 
-    /// Adds the files of a rig, as far as they can be read again.
+    /// The inputs that are not here though the run read them, each with the reason.
+    pub fn left_out(&self) -> impl Iterator<Item = (&str, &str)> {
+        self.facts.iter().filter_map(|(name, why)| Some((name.strip_prefix(LEFT_OUT)?, &**why)))
+    }
+
+    /// Adds the files of a rig, as it was made of them.
     fn attach_inputs(&mut self, rig: &Rig) {
-        self.attach("scene", &rig.scene_file);
+        let name = format!("scene:{}", rig.scene_file.display());
+        self.files.push(InputFile { name, bytes: rig.scene.text.as_str().into() });
         if let Some(hand) = &rig.hand {
             // The rig keeps the absolute path, which is another on every machine.
             let name = hand.path.file_name().map(PathBuf::from).unwrap_or_default();
-            self.attach_as(format!("hand:{}", name.display()), &hand.path);
+            self.files
+                .push(InputFile { name: format!("hand:{}", name.display()), bytes: hand.bytes.to_vec() });
         }
         let mut left = MOST_MODEL_BYTES;
         let mut models: Vec<&PathBuf> = rig.model_files().collect();
@@ -143,25 +153,23 @@ impl About {
         models.dedup();
         for model in models {
             let length = model.metadata().map_or(0, |file| file.len());
-            match left.checked_sub(length) {
-                Some(rest) => {
-                    left = rest;
-                    self.attach("model", model);
+            let Some(rest) = left.checked_sub(length) else {
+                self.leave_out(model, format!("{length} bytes"));
+                continue;
+            };
+            left = rest;
+            match input_file::read(model, MAX_TABLE_BYTES) {
+                Err(error) => self.leave_out(model, format!("it cannot be read any more: {error}")),
+                Ok(_) if rig.has_changed(model) => {
+                    self.leave_out(model, "it has changed since the run read it".into());
                 }
-                None => self.tell(&format!("left out: {}", model.display()), format!("{length} bytes")),
+                Ok(bytes) => self.files.push(InputFile { name: format!("model:{}", model.display()), bytes }),
             }
         }
     }
 
-    fn attach(&mut self, what: &str, path: &Path) {
-        self.attach_as(format!("{what}:{}", path.display()), path);
-    }
-
-    fn attach_as(&mut self, name: String, path: &Path) {
-        // What is no file, as a built-in scene, cannot be read twice.
-        if let Ok(bytes) = input_file::read(path, MAX_TABLE_BYTES) {
-            self.files.push(InputFile { name, bytes });
-        }
+    fn leave_out(&mut self, file: &Path, why: String) {
+        self.tell(&format!("{LEFT_OUT}{}", file.display()), why);
     }
 
     /// The file that is this to the run.
@@ -246,6 +254,38 @@ mod tests {
         let words = |line: &str| line.split(' ').map(OsString::from).collect::<Vec<_>>();
         let line = "phantom3 run a.toml --record x.mcap --seed 3 --record=y.csv --headless";
         assert_eq!(inputs_of(words(line)), ["run", "a.toml", "--seed", "3", "--headless"]);
+    }
+
+    /// Editors save files while a run begins.
+    #[test]
+    fn inputs_that_change_after_they_were_read_are_attached_as_they_were_or_not_at_all() {
+        let directory = tempfile::tempdir().expect("a directory");
+        let path = |name: &str| directory.path().join(name);
+        let cube = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n";
+        let entity = |model: &str| format!("[[entity]]\nshape = {{ kind = \"mesh\", file = \"{model}\" }}\n");
+        let scene = format!("[[finger]]\n{}{}{}", entity("a.obj"), entity("b.obj"), entity("c.obj"));
+        let hand = "t,f0_x,f0_y,f0_z\n0,0,0,0\n1,0,0,0\n";
+        for (name, text) in
+            [("s.toml", &*scene), ("h.csv", hand), ("a.obj", cube), ("b.obj", cube), ("c.obj", cube)]
+        {
+            std::fs::write(path(name), text).expect("room");
+        }
+        let read = world::Scene::load(path("s.toml")).expect("a scene");
+        let rig = Rig::new(&path("s.toml"), read, None, Some(&path("h.csv")), HandMode::Kinematic, 1_000_000);
+        let rig = rig.expect("a rig");
+        for (name, text) in [("s.toml", "[[finger]]\n"), ("h.csv", "t\n"), ("b.obj", "v 9 9 9\n")] {
+            std::fs::write(path(name), text).expect("room");
+        }
+        std::fs::remove_file(path("c.obj")).expect("ours");
+        let about = About::of_run(&rig, ClockMode::Virtual, 1_000_000, 0);
+        let [scene_now, hand_now] = ["scene", "hand"].map(|what| about.file(what).expect("attached").1);
+        assert_eq!((scene_now, hand_now), (scene.as_bytes(), hand.as_bytes()));
+        let models: Vec<_> = about.files.iter().filter(|file| file.name.starts_with("model:")).collect();
+        assert!(models.len() == 1 && models[0].name.ends_with("a.obj"), "{models:?}");
+        let left_out: Vec<_> = about.left_out().collect();
+        let [(b, changed), (c, gone)] = left_out[..] else { panic!("{left_out:?}") };
+        assert!(b.ends_with("b.obj") && changed.contains("has changed since the run read it"), "{changed}");
+        assert!(c.ends_with("c.obj") && gone.contains("cannot be read any more"), "{gone}");
     }
 
     #[test]

@@ -2,9 +2,11 @@
 //!
 //! Model: a name that ends in nothing known is refused before anything runs, since people find a table where they wanted
 //! something else only after the experiment. What is there already and is no regular file (a pipe, a device) has
-//! no need of an ending: it takes a table.
+//! no need of an ending: it takes a table. A file that a shell leads a standard stream into is known by its device and inode.
 
+use rustix::fs::{FileType, fstat};
 use std::ffi::OsStr;
+use std::io;
 use std::os::unix::fs::MetadataExt;
 use std::path::{Path, PathBuf};
 use thiserror::Error;
@@ -122,6 +124,56 @@ impl TableFormat {
 /// Whether this stands for the standard output.
 pub fn is_standard_output(file: &Path) -> bool {
     file == Path::new(STANDARD_OUTPUT)
+}
+
+/// A standard stream of this process that a shell may have led into a file.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Stream {
+    /// What is read.
+    Input,
+    /// What a table or a report is written to.
+    Output,
+    /// What is told meanwhile.
+    Error,
+}
+
+impl Stream {
+    /// In words.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Input => "the standard input",
+            Self::Output => "the standard output",
+            Self::Error => "standard error",
+        }
+    }
+
+    /// The first that is this regular file, by whichever name.
+    pub fn that_is(file: &Path) -> Option<Self> {
+        [Self::Output, Self::Error, Self::Input].into_iter().find(|stream| stream.is(file))
+    }
+
+    /// Whether it is this regular file.
+    pub fn is(self, file: &Path) -> bool {
+        let named = file.metadata().ok().map(|file| (file.dev(), file.ino()));
+        named.is_some() && named == self.identity()
+    }
+
+    /// Whether both are one regular file.
+    pub fn is_also(self, other: Self) -> bool {
+        self.identity().is_some_and(|identity| other.identity() == Some(identity))
+    }
+
+    /// Device and inode, if it is a regular file.
+    fn identity(self) -> Option<(u64, u64)> {
+        let found = match self {
+            Self::Input => fstat(io::stdin()),
+            Self::Output => fstat(io::stdout()),
+            Self::Error => fstat(io::stderr()),
+        };
+        let found = found.ok()?;
+        (FileType::from_raw_mode(found.st_mode) == FileType::RegularFile)
+            .then_some((found.st_dev, found.st_ino))
+    }
 }
 
 /// Whether both names lead to the same bytes, by links of either kind.

@@ -37,16 +37,13 @@ impl EventsFile {
     }
 
     /// The run goes: a file without events is a result, too.
-    ///
-    /// # Errors
-    /// If it cannot be emptied.
-    pub fn start(&mut self) -> Result<(), RecordingError> {
-        self.lines.start().map_err(|source| self.failed(source))
+    pub fn start(&mut self) {
+        self.lines.start();
     }
 
-    /// Whether the file has its earlier content still.
-    pub fn has_content(&self) -> bool {
-        self.lines.has_content()
+    /// No tick has come, and the file has its earlier content.
+    pub fn is_as_before(&self) -> bool {
+        self.lines.is_as_before()
     }
 
     /// Appends an event.
@@ -76,7 +73,6 @@ impl EventsFile {
     /// If that fails, or nobody would find it.
     pub fn finish(mut self) -> Result<u64, RecordingError> {
         self.lines.keep().map_err(|source| self.failed(source))?;
-        self.flush()?;
         let rows = self.lines.rows();
         if self.lines.is_removed() {
             Err(RecordingError::Removed { file: self.path, rows })
@@ -86,6 +82,9 @@ impl EventsFile {
     }
 
     fn failed(&self, source: io::Error) -> RecordingError {
+        if self.lines.has_content() {
+            return RecordingError::NotBegun { file: self.path.clone(), source };
+        }
         let until_s = run_time_s(self.lines.last_tick().cast_signed(), self.period_ns);
         RecordingError::Write { file: self.path.clone(), source, until_s, rows: self.lines.rows() }
     }

@@ -1,6 +1,6 @@
 //! Which files a run is recorded in: those that were asked for, and beside each one of its own for every other scene.
 
-use super::destination::{is_same_place, is_standard_output};
+use super::destination::{Stream, is_same_place, is_standard_output};
 use super::{
     About, Backpressure, Beginning, Opened, RecordFile, Recorder, View, begin_all, create, create_events,
     create_under_way,
@@ -59,11 +59,9 @@ impl Files {
         }
     }
 
-    /// Those of the scene of this number, after the first. On the standard output a table has one header, which is that of the first scene.
-    ///
-    /// # Errors
-    /// If one cannot be made.
-    pub fn of_scene(&mut self, rig: &Rig, view: &View, number: u32) -> Result<Vec<Recorder>, RecordingError> {
+    /// Those of the scene of this number, after the first, or why one cannot be made, which keeps none of the others. On the
+    /// standard output a table has one header, which is that of the first scene.
+    pub fn of_scene(&mut self, rig: &Rig, view: &View, number: u32) -> Vec<Result<Recorder, RecordingError>> {
         let (streams, files): (Vec<_>, Vec<_>) =
             self.record.clone().into_iter().partition(|path| is_standard_output(path));
         if !streams.is_empty() {
@@ -121,7 +119,7 @@ fn free_place(first: &Path, scene: u32, taken: &[&PathBuf]) -> PathBuf {
     let mut number = scene + 1;
     loop {
         let place = numbered(first, number);
-        if !taken.iter().any(|other| is_same_place(&place, other)) {
+        if !taken.iter().any(|other| is_same_place(&place, other)) && Stream::that_is(&place).is_none() {
             return place;
         }
         number += 1;

@@ -15,6 +15,7 @@
 //! Invariant: what could not be written as a whole is cut off again; after that nothing more is written, not even an end.
 
 use super::about::{self, About};
+use super::destination::shown;
 use super::event_line::{holders, name, said};
 use super::foxglove;
 use super::opened::Opened;
@@ -27,6 +28,7 @@ use crate::columns::Names;
 use crate::recording::RecordingError;
 use crate::row::{BodyRow, Row};
 use io_driver::device::run_time_s;
+use io_driver::say::say;
 use mcap::records::{MessageHeader, Metadata};
 use mcap::write::NoSeek;
 use mcap::{Attachment, Compression, McapError, WriteOptions, Writer};
@@ -58,10 +60,7 @@ pub(super) const ORDER_TOPIC: &str = "/orders";
 /// An MCAP file being written.
 pub struct McapFile {
     writer: Writer<NoSeek<WholeWrites>>,
-    /// The file had some, and has it until it is started.
-    has_content: bool,
-    /// The first row is there.
-    is_started: Arc<AtomicBool>,
+    beginning: Arc<Beginning>,
     path: PathBuf,
     names: Names,
     period_ns: u64,
@@ -98,7 +97,7 @@ struct Channels {
 
 impl McapFile {
     /// Writes what is known before the first tick; into what may wait for a reader, with the first [`Self::flush`], and
-    /// into a file that has content, with the first row or event.
+    /// into a file that has content, with the first chunk that has rows.
     ///
     /// # Errors
     /// If that cannot be written.
@@ -126,15 +125,17 @@ impl McapFile {
     ) -> Result<Self, RecordingError> {
         let path = file.path().to_owned();
         let failed = |error| RecordingError::Create { file: path.clone(), source: into_io(error) };
-        let (may_wait, has_content) = (file.may_wait(), file.has_content());
-        let is_started = Arc::new(AtomicBool::new(false));
-        let writes = WholeWrites::new(file, Arc::clone(&is_started));
+        let may_wait = file.may_wait();
+        let beginning = Arc::new(Beginning::default());
+        let writes = WholeWrites::new(file, Arc::clone(&beginning));
         let mut writer = options().create(NoSeek::new(writes)).map_err(failed)?;
         let channels = begin(&mut writer, &names, about).map_err(failed)?;
+        for (input, why) in about.left_out() {
+            say(format_args!("phantom3: {} is recorded without {input}: {why}", shown(&path).display()));
+        }
         let mut file = Self {
             writer,
-            has_content,
-            is_started,
+            beginning,
             path: path.clone(),
             names,
             period_ns,
@@ -176,9 +177,10 @@ impl McapFile {
         Self { is_current: true, ..self }
     }
 
-    /// Whether the file has its earlier content still.
-    pub fn has_content(&self) -> bool {
-        self.has_content && !self.is_started.load(Ordering::Relaxed)
+    /// No row has come, and the file has its earlier content.
+    pub fn is_as_before(&self) -> bool {
+        let Beginning { has_content, has_rows } = &*self.beginning;
+        has_content.load(Ordering::Relaxed) && !has_rows.load(Ordering::Relaxed)
     }
 
     /// Appends a row and its bodies.
@@ -186,10 +188,7 @@ impl McapFile {
     /// # Errors
     /// If it or rows before it cannot be written.
     pub fn append(&mut self, row: &Row, bodies: &[BodyRow]) -> Result<(), RecordingError> {
-        if !self.is_started.swap(true, Ordering::Relaxed) {
-            // What is known before the first tick, if it is not there yet.
-            self.writer.flush().map_err(|error| self.failed(error))?;
-        }
+        self.beginning.has_rows.store(true, Ordering::Relaxed);
         if self.chunk_rows == 0 {
             self.chunk_began = row.run_tick;
         } else if self.chunk_bytes > CHUNK_BYTES || self.time_ns(row.run_tick - self.chunk_began) >= CHUNK_NS
@@ -306,10 +305,10 @@ impl McapFile {
     /// # Errors
     /// If that fails, or nobody would find it.
     pub fn finish(mut self) -> Result<u64, RecordingError> {
-        if self.has_content() {
+        if self.is_as_before() {
             return Ok(0);
         }
-        self.is_started.store(true, Ordering::Relaxed);
+        self.beginning.has_rows.store(true, Ordering::Relaxed);
         self.flush()?;
         let facts = BTreeMap::from([
             ("rows".to_owned(), self.rows.to_string()),
@@ -369,8 +368,11 @@ impl McapFile {
     }
 
     fn failed(&self, error: McapError) -> RecordingError {
-        let (file, until_s, rows) = (self.path.clone(), self.until_s(), self.rows);
-        RecordingError::Write { file, source: into_io(error), until_s, rows }
+        let (file, source, until_s, rows) = (self.path.clone(), into_io(error), self.until_s(), self.rows);
+        if self.beginning.has_content.load(Ordering::Relaxed) {
+            return RecordingError::NotBegun { file, source };
+        }
+        RecordingError::Write { file, source, until_s, rows }
     }
 }
 
@@ -444,13 +446,22 @@ fn into_io(error: McapError) -> io::Error {
     if let McapError::Io(error) = error { error } else { io::Error::other(error) }
 }
 
+/// What a recording and what it is written by both see of its beginning.
+#[derive(Debug, Default)]
+struct Beginning {
+    /// The file has its earlier content still.
+    has_content: AtomicBool,
+    /// The first row has come.
+    has_rows: AtomicBool,
+}
+
 /// Gathers what is written until it is flushed, then writes it whole or, if it does not fit, not at all. Into a file that has
-/// content nothing is written before it is started.
+/// content nothing is written before there are rows, and nothing at all if these do not fit.
 #[derive(Debug)]
 struct WholeWrites {
     file: Opened,
     has_name: bool,
-    is_started: Arc<AtomicBool>,
+    beginning: Arc<Beginning>,
     pending: Vec<u8>,
     written_bytes: u64,
     /// Something did not fit. The library still writes an end behind it, which would be that of a whole file.
@@ -458,9 +469,10 @@ struct WholeWrites {
 }
 
 impl WholeWrites {
-    fn new(file: Opened, is_started: Arc<AtomicBool>) -> Self {
+    fn new(file: Opened, beginning: Arc<Beginning>) -> Self {
         let has_name = file.has_name();
-        Self { file, has_name, is_started, pending: Vec::new(), written_bytes: 0, has_ended: false }
+        beginning.has_content.store(file.has_content(), Ordering::Relaxed);
+        Self { file, has_name, beginning, pending: Vec::new(), written_bytes: 0, has_ended: false }
     }
 
     /// The name is gone that the file had in the beginning.
@@ -478,7 +490,14 @@ impl WholeWrites {
         }
     }
 
-    /// Cuts off what has reached the file in part.
+    /// The file as it is to be for so many bytes more.
+    fn start(&mut self, bytes: u64) -> io::Result<()> {
+        self.file.start(bytes)?;
+        self.beginning.has_content.store(false, Ordering::Relaxed);
+        Ok(())
+    }
+
+    /// Cuts off what has reached the file in part. The file has been started: earlier content is not cut.
     fn end(&mut self) {
         self.has_ended = true;
         // If even this fails, readers skip the last piece.
@@ -494,14 +513,19 @@ impl Write for WholeWrites {
     }
 
     fn flush(&mut self) -> io::Result<()> {
-        if self.is_started.load(Ordering::Relaxed) {
-            self.file.start()?;
-        } else if self.file.has_content() {
-            return self.file.reserve(self.pending.len() as u64);
+        let bytes = self.pending.len() as u64;
+        if self.file.has_content() && !self.beginning.has_rows.load(Ordering::Relaxed) {
+            return self.file.reserve(bytes);
         }
         let pending = std::mem::take(&mut self.pending);
         if self.has_ended {
             return Err(io::Error::other("an earlier write failed"));
+        }
+        if self.beginning.has_rows.load(Ordering::Relaxed)
+            && let Err(refused) = self.start(bytes)
+        {
+            self.has_ended = true;
+            return Err(refused);
         }
         let written = self.file.file().write_all(&pending);
         match written {

@@ -3,8 +3,10 @@
 //! Problem: a run that cannot start, because another of its files cannot be made, or there is no thread or no memory for
 //! it, must not cost an earlier recording; nor may one process empty what another one writes.
 //! Model: a regular file is claimed when it is opened, until it is closed. The standard output is not: who opened it lets
-//! whom they want write there. A file with content keeps it until the first row is there ([`Opened::start`]); that its
-//! beginning will fit is found out before ([`Opened::reserve`]). Any other file begins at once.
+//! whom they want write there. A file with content keeps it until its first piece with a row can be written, for which room
+//! is reserved then ([`Opened::start`]); that its beginning alone will fit is found out before the run
+//! ([`Opened::reserve`]). The piece is written over the content, in whose room and the reserved one it lies: also on a disk
+//! that others fill meanwhile. Any other file begins at once.
 //! Invariant: what was opened and not started is as it was: a file that was made here is removed again.
 
 use super::destination::{is_standard_output, shown};
@@ -151,13 +153,18 @@ impl Opened {
         }
     }
 
-    /// Empties it if it has content, and keeps it from now on whatever becomes of it.
+    /// Gives up the content, if there is some, for a first piece of so many bytes, which is to be written at once; keeps
+    /// the file from now on whatever becomes of it.
     ///
     /// # Errors
-    /// If the system refuses.
-    pub(super) fn start(&mut self) -> io::Result<()> {
+    /// If the piece will not fit, or the system refuses: the file is as it was.
+    pub(super) fn start(&mut self, first_bytes: u64) -> io::Result<()> {
         if self.has_content() {
-            self.file.set_len(0)?;
+            self.reserve(first_bytes)?;
+            // The room of what stays is that of the piece.
+            if self.file.metadata()?.len() > first_bytes {
+                self.file.set_len(first_bytes)?;
+            }
         }
         self.before = Before::Stays;
         Ok(())
@@ -168,7 +175,7 @@ impl Opened {
     /// # Errors
     /// If the system refuses.
     pub fn empty(mut self) -> io::Result<File> {
-        self.start()?;
+        self.start(0)?;
         self.file.try_clone()
     }
 

@@ -28,12 +28,12 @@ impl RecordFile {
         }
     }
 
-    /// Whether the file has its earlier content still.
-    pub(super) fn has_content(&self) -> bool {
+    /// No row has come, and the file has its earlier content.
+    pub(super) fn is_as_before(&self) -> bool {
         match self {
-            Self::Csv(file) => file.has_content(),
-            Self::Mcap(file) => file.has_content(),
-            Self::Events(file) => file.has_content(),
+            Self::Csv(file) => file.is_as_before(),
+            Self::Mcap(file) => file.is_as_before(),
+            Self::Events(file) => file.is_as_before(),
         }
     }
 
@@ -41,7 +41,10 @@ impl RecordFile {
         match self {
             Self::Csv(file) => file.append(row, bodies),
             Self::Mcap(file) => file.append(row, bodies),
-            Self::Events(file) => file.start(),
+            Self::Events(file) => {
+                file.start();
+                Ok(())
+            }
         }
     }
 

@@ -50,8 +50,16 @@ pub struct Recorded {
     pub lost: u64,
     /// Why it is not complete, if it is not; has been told.
     pub failure: Option<String>,
-    /// No tick came, and the file has its earlier content.
+    /// The file has its earlier content: no tick came, or not even the first rows would fit.
     pub is_as_before: bool,
+}
+
+impl Recorded {
+    /// A recording for which there is no file; nothing of it was written anywhere.
+    pub fn not_begun(error: &RecordingError) -> Self {
+        let (path, failure) = (error.file().into(), Some(error.to_string()));
+        Self { path, rows: 0, unit: "rows", lost: 0, failure, is_as_before: true }
+    }
 }
 
 /// Hands events to a recording, as [`Recorder::send`] does rows.
@@ -117,8 +125,8 @@ struct Shared {
     has_failed: AtomicBool,
     /// Nobody reads the standard output any more.
     reader_has_gone: AtomicBool,
-    /// The file's earlier content is there until the end.
-    has_content: AtomicBool,
+    /// The file has its earlier content in the end.
+    is_as_before: AtomicBool,
     /// The run did not begin, and the file is to be as it was.
     is_in_vain: AtomicBool,
 }
@@ -324,7 +332,7 @@ impl Recorder {
             }
             Err(_) => (0, Some(panicked(&path))),
         };
-        let is_as_before = shared.has_content.load(Ordering::Relaxed);
+        let is_as_before = shared.is_as_before.load(Ordering::Relaxed);
         Recorded { path, rows, unit, lost, failure: failure.or(given_up), is_as_before }
     }
 
@@ -410,7 +418,7 @@ impl RecorderThread {
             return self.abandon(error);
         }
         let Some(file) = self.file.take() else { return result };
-        self.shared.has_content.store(file.has_content(), Ordering::Relaxed);
+        self.shared.is_as_before.store(file.is_as_before(), Ordering::Relaxed);
         if self.shared.is_in_vain.load(Ordering::Relaxed) && self.shared.progress.taken() == 0 {
             return Ok(0);
         }
@@ -425,6 +433,9 @@ impl RecorderThread {
         {
             self.shared.reader_has_gone.store(true, Ordering::Relaxed);
             return Ok(*rows);
+        }
+        if let RecordingError::NotBegun { .. } = error {
+            self.shared.is_as_before.store(true, Ordering::Relaxed);
         }
         say(format_args!("phantom3: {error}"));
         self.shared.has_failed.store(true, Ordering::Relaxed);

@@ -2,7 +2,7 @@
 //!
 //! Model: lines are gathered and written together. Into what may wait for a reader (a pipe, a terminal) even the first is
 //! written with the others, by the thread that can wait; into a file with earlier content, which it has until then, with
-//! the first that counts; into anything else at once.
+//! the first that count, once they are sure to fit; into anything else at once.
 //! Invariants: whatever goes wrong, a file ends with a complete line: a write that failed half way (a full disk) is cut
 //! back to the last line that fits. Only lines that are in the file count.
 
@@ -18,6 +18,7 @@ const CHUNK_BYTES: usize = 256 * 1024;
 pub(crate) struct WholeLines {
     file: Opened,
     has_name: bool,
+    /// It is a result, whatever becomes of it.
     is_started: bool,
     /// Whole lines that are not in the file yet.
     buffer: String,
@@ -52,16 +53,9 @@ impl WholeLines {
         Ok(lines)
     }
 
-    /// From now on the file is a result, and what it had before is gone.
-    ///
-    /// # Errors
-    /// If it cannot be emptied.
-    pub(crate) fn start(&mut self) -> io::Result<()> {
-        if !self.is_started {
-            self.file.start()?;
-            self.is_started = true;
-        }
-        Ok(())
+    /// From now on the file is a result; what it had before goes with the next [`Self::flush`].
+    pub(crate) fn start(&mut self) {
+        self.is_started = true;
     }
 
     /// Appends the line that `write` makes of this tick.
@@ -69,7 +63,7 @@ impl WholeLines {
     /// # Errors
     /// If it or lines before it cannot be written.
     pub(crate) fn append(&mut self, tick: u64, write: impl FnOnce(&mut String)) -> io::Result<()> {
-        self.start()?;
+        self.start();
         write(&mut self.buffer);
         self.buffer.push('\n');
         self.ends.push((self.buffer.len(), tick));
@@ -89,9 +83,12 @@ impl WholeLines {
     /// Writes the lines that are not in the file yet.
     ///
     /// # Errors
-    /// If that fails; lines that did reach the file are complete.
+    /// If that fails; lines that did reach the file are complete. If the first do not fit into a file with earlier
+    /// content, that stays.
     pub(crate) fn flush(&mut self) -> io::Result<()> {
-        if self.file.has_content() {
+        if self.is_started {
+            self.file.start(self.buffer.len() as u64)?;
+        } else if self.file.has_content() {
             return Ok(());
         }
         let mut done = 0;
@@ -118,12 +115,20 @@ impl WholeLines {
         self.file.has_content()
     }
 
+    /// Neither a line nor anything else has made a result of it, and it has what it had before.
+    pub(crate) fn is_as_before(&self) -> bool {
+        self.has_content() && !self.is_started
+    }
+
     /// At an end in order a file without lines stays, unless that would cost its earlier content.
     ///
     /// # Errors
-    /// As [`Self::start`].
+    /// As [`Self::flush`].
     pub(crate) fn keep(&mut self) -> io::Result<()> {
-        if self.has_content() { Ok(()) } else { self.start() }
+        if !self.is_as_before() {
+            self.start();
+        }
+        self.flush()
     }
 
     /// Writes everything out to the disk itself.

@@ -15,6 +15,7 @@ use nalgebra::{Isometry3, Point3, Vector3};
 use rt_core::input_file;
 use shm_abi::segment::ClockMode;
 use std::path::Path;
+use std::sync::Arc;
 use world::Scene;
 
 /// Farther than that nothing is wanted (m).
@@ -197,7 +198,8 @@ pub(super) fn check_hand(path: &Path, named_by: &str, scene: &Scene) -> Result<H
     if !path.metadata().map_err(unreadable)?.is_file() {
         return Err(RigError::NotAFile { file: path.into(), named_by: named_by.into() });
     }
-    let text = input_file::read_text(path, MAX_TABLE_BYTES).map_err(unreadable)?;
+    let bytes: Arc<[u8]> = input_file::read(path, MAX_TABLE_BYTES).map_err(unreadable)?.into();
+    let text = input_file::text(bytes.to_vec()).map_err(unreadable)?;
     let fingers: Vec<&str> = scene.fingers.iter().map(|finger| finger.name.as_str()).collect();
     let script = HandScript::parse(&text, path, &fingers)?;
     if script.duration_s() > LONGEST_RUN_S {
@@ -205,5 +207,5 @@ pub(super) fn check_hand(path: &Path, named_by: &str, scene: &Scene) -> Result<H
     }
     let path = std::path::absolute(path).map_err(unreadable)?;
     let bounds = (0..fingers.len()).map(|finger| script.bounds(finger)).collect();
-    Ok(HandFile { path, duration_s: script.duration_s(), rows: script.rows(), bounds })
+    Ok(HandFile { path, bytes, duration_s: script.duration_s(), rows: script.rows(), bounds })
 }

@@ -6,6 +6,8 @@
 
 use khronos_egl as egl;
 use rt_core::limits;
+use std::fs::File;
+use std::io;
 use std::sync::{Arc, Mutex};
 
 /// `EGL_PLATFORM_SURFACELESS_MESA`.
@@ -37,19 +39,22 @@ pub enum NoPictures {
         /// In words.
         limit: String,
     },
+    /// The same, of files.
+    #[error("no pictures: libEGL {step} ({reason}); {remedy}")]
+    Files {
+        /// What it did not do.
+        step: &'static str,
+        /// In its words.
+        reason: String,
+        /// In words.
+        remedy: String,
+    },
     /// What draws in software would wait for ever for those of its threads that it did not get.
     #[error("no pictures: {0}")]
     Threads(String),
     /// There is a context, and it cannot do what is needed.
     #[error("no pictures: {0}")]
     Graphics(String),
-}
-
-impl NoPictures {
-    /// The machine can draw, and this process may not use enough of it.
-    pub fn is_of_a_limit(&self) -> bool {
-        matches!(self, Self::Memory { .. } | Self::Threads(_))
-    }
 }
 
 /// A context in which this thread draws, as long as it lives.
@@ -136,26 +141,43 @@ fn refuse_without_threads() -> Result<(), NoPictures> {
         let _shut = gate.lock();
         let wait = || drop(gate.lock());
         let start = |_| std::thread::Builder::new().stack_size(STACK_BYTES).spawn_scoped(scope, wait);
-        let started = (0..count).map(start).collect::<std::io::Result<Vec<_>>>();
+        let started = (0..count).map(start).collect::<io::Result<Vec<_>>>();
         started.map(drop).map_err(|error| NoPictures::Threads(limits::no_thread(&error)))
     })
 }
 
 fn no_library(reason: String) -> NoPictures {
-    match limits::memory_limit().filter(|_| !reason.contains("No such file")) {
-        Some(limit) => NoPictures::Memory { step: "cannot be loaded", reason, limit },
-        None => NoPictures::NoLibrary(reason),
+    if reason.contains("No such file") {
+        return NoPictures::NoLibrary(reason);
     }
+    of_a_limit("cannot be loaded", reason).unwrap_or_else(NoPictures::NoLibrary)
 }
 
 fn failed(step: &'static str) -> impl Fn(egl::Error) -> NoPictures {
     move |error| {
-        let reason = error.to_string();
-        match limits::memory_limit() {
-            Some(limit) => NoPictures::Memory { step, reason, limit },
-            None => NoPictures::NoContext { step, reason },
-        }
+        let refused = of_a_limit(step, error.to_string());
+        refused.unwrap_or_else(|reason| NoPictures::NoContext { step, reason })
     }
+}
+
+/// What a limit of this process has likely kept from being done, or the reason again.
+fn of_a_limit(step: &'static str, reason: String) -> Result<NoPictures, String> {
+    if let Some(remedy) = missing_files() {
+        return Ok(NoPictures::Files { step, reason, remedy });
+    }
+    match limits::memory_limit() {
+        Some(limit) => Ok(NoPictures::Memory { step, reason, limit }),
+        None => Err(reason),
+    }
+}
+
+/// So many files a graphics library has open at once while it is loaded, about.
+const MOST_LOADING_FILES: usize = 8;
+
+/// What to do where this process may not open so many.
+fn missing_files() -> Option<String> {
+    let opened = (0..MOST_LOADING_FILES).map(|_| File::open("/dev/null")).collect::<io::Result<Vec<_>>>();
+    limits::remedy(&opened.err()?)
 }
 
 fn name_of(gl: &three_d::context::Context) -> String {

@@ -105,7 +105,7 @@ pub use motion::{MassSpec, MotionSpec};
 pub use names::{MAX_NAME_BYTES, is_name};
 pub use passivity::PassivitySpec;
 pub use placement::{Affine, LEAST_STRETCH, MOST_STRETCH, Placement};
-pub use scene::Scene;
+pub use scene::{Scene, SceneText};
 pub use settings::{Origin, Set, Settings, StereoMode};
 pub use shading::{ShadingFormSpec, ShadingSpec};
 pub use shape::{MeshSpec, ShapeSpec};

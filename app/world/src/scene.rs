@@ -1,6 +1,8 @@
 //! The scene: everything a run starts with.
 
+use std::fmt;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 use nalgebra::Vector3;
 
@@ -52,6 +54,31 @@ pub struct Scene {
     pub templates: Vec<SceneTemplate>,
     /// The files that it includes, in the order in which they were read.
     pub included: Vec<PathBuf>,
+    /// What its own file has.
+    pub text: SceneText,
+}
+
+/// The text of a scene's file, as the scene was made of it. It says nothing that the scene does not: all are equal.
+#[derive(Clone, Default)]
+pub struct SceneText(Arc<str>);
+
+impl SceneText {
+    /// The text.
+    pub fn as_str(&self) -> &str {
+        &self.0
+    }
+}
+
+impl PartialEq for SceneText {
+    fn eq(&self, _: &Self) -> bool {
+        true
+    }
+}
+
+impl fmt::Debug for SceneText {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{} bytes", self.0.len())
+    }
 }
 
 impl Scene {
@@ -104,7 +131,9 @@ impl Scene {
         }
         let problems = problems.all();
         match scene {
-            Some(scene) if problems.is_empty() => Ok(Self { included: sources.included(), ..scene }),
+            Some(scene) if problems.is_empty() => {
+                Ok(Self { included: sources.included(), text: SceneText(text.into()), ..scene })
+            }
             _ => Err(problems),
         }
     }
@@ -142,6 +171,7 @@ impl Scene {
             cameras: things.cameras,
             templates: things.templates,
             included: Vec::new(),
+            text: SceneText::default(),
         })
     }
 }

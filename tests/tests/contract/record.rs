@@ -294,10 +294,8 @@ fn a_file_that_may_not_grow_any_more_does_not_end_the_run() {
     check_full_disk(&place, &said, "File too large", "200201 answered");
 }
 
-#[test]
-fn a_disk_that_fills_up_does_not_end_the_run() {
-    let mount = "mkdir small && mount -t tmpfs -o size=900k tmpfs small";
-    let (place, _) = workplace("default");
+/// Whether these processes can have a disk of their own, which only they see; that they cannot is told.
+fn can_mount(place: &Workplace) -> bool {
     let mut possible = place.prepare(Command::new("unshare"));
     possible.args([
         "--user",
@@ -311,9 +309,42 @@ fn a_disk_that_fills_up_does_not_end_the_run() {
         eprintln!(
             "skipped: no small disk can be mounted here; the test with a limited file covers the same path"
         );
+        return false;
+    }
+    true
+}
+
+/// Room for what stands before the first tick, and not for the first half second.
+#[test]
+fn a_disk_without_room_for_the_first_rows_leaves_the_earlier_recordings() {
+    let (place, _) = workplace("default");
+    if !can_mount(&place) {
         return;
     }
-    // A disk of its own, which only these processes see; what is on it is copied out at the end.
+    let mount = "mkdir small && mount -t tmpfs -o size=48k tmpfs small";
+    for name in ["out.mcap", "out.csv"] {
+        let (begin, end) = (format!("printf earlier >small/{name}"), format!("cp small/{name} {name}"));
+        let inside = format!("{mount} && {begin} && \"$0\" \"$@\"; end=$?; {end}; exit $end");
+        let script = format!("exec unshare --user --map-root-user --mount sh -c '{inside}' \"$0\" \"$@\"");
+        let record = format!("small/{name}");
+        let said = place.shell(&script, &["--clock", "virtual", "--seconds", "2", "--record", &record]);
+        assert_eq!(said.status, Some(3), "{}{}", said.out, said.err);
+        let told = format!("cannot write the recording small/{name}: No space left on device");
+        assert!(said.err.contains(&told) && said.err.contains("is as it was"), "{}", said.err);
+        assert!(said.out.contains("(0 rows) NOT WRITTEN"), "{}", said.out);
+        assert_eq!(bytes(&place, name), b"earlier", "{name}: {}", said.err);
+        std::fs::remove_dir(place.path("small")).expect("ours");
+    }
+}
+
+#[test]
+fn a_disk_that_fills_up_does_not_end_the_run() {
+    let mount = "mkdir small && mount -t tmpfs -o size=900k tmpfs small";
+    let (place, _) = workplace("default");
+    if !can_mount(&place) {
+        return;
+    }
+    // What is on it is copied out at the end.
     let inside = format!("{mount} && \"$0\" \"$@\"; end=$?; cp small/out.mcap out.mcap; exit $end");
     let script = format!("exec unshare --user --map-root-user --mount sh -c '{inside}' \"$0\" \"$@\"");
     for clock in ["virtual", "lockstep"] {

@@ -5,7 +5,7 @@ use crate::bad_input::run_in_little_memory;
 use patience::prelude::*;
 use std::os::unix::fs::PermissionsExt;
 use std::path::Path;
-use std::process::Command;
+use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
 use system_tests::faults::scarcity::limited;
 use system_tests::workplace::{Running, Said, Workplace};
@@ -116,6 +116,52 @@ fn a_recording_whose_beginning_does_not_fit_leaves_the_earlier_one() {
     assert!(place.snapshot() == before, "{}", said.err);
 }
 
+/// `None`, which is told: nothing here makes system calls fail.
+fn with_failing(place: &Workplace, calls: &str, arguments: &[&str]) -> Option<Said> {
+    let inject = format!("inject={calls}");
+    let of = |what: &[&str]| {
+        let mut command = place.prepare(Command::new("strace"));
+        command.args(["-f", "-o", "calls.txt", "-e", &inject]).args(what);
+        command
+    };
+    if !of(&["true"]).stderr(Stdio::null()).bounded_status().is_ok_and(|status| status.success()) {
+        eprintln!("skipped: there is no strace that may trace here");
+        return None;
+    }
+    let program = place.phantom3();
+    let program = program.get_program().to_str().expect("a path in letters");
+    Some(Running::start(of(&[&[program], arguments].concat())).wait())
+}
+
+#[test]
+fn an_earlier_recording_that_cannot_be_emptied_is_as_it_was() {
+    let place = workplace();
+    for name in ["o.mcap", "o.csv"] {
+        recorded(&place, "2", &[name]);
+        let before = bytes(&place, name);
+        let arguments = [&RUN[..], &["0.2", "--record", name]].concat();
+        let Some(said) = with_failing(&place, "ftruncate:error=ENOSPC:when=1", &arguments) else { return };
+        // The first may be that of a segment.
+        assert_ne!(said.status, Some(0), "{}", said.err);
+        assert!(bytes(&place, name) == before, "{name}: {}", said.err);
+    }
+}
+
+#[test]
+fn a_table_that_cannot_have_the_rights_of_the_earlier_one_leaves_nothing_beside_it() {
+    let place = workplace();
+    recorded(&place, "0.1", &["r.mcap", "r.csv"]);
+    place.write("o.csv", "earlier");
+    let arguments = ["export", "r.mcap", "o.csv"];
+    let Some(said) = with_failing(&place, "fchmod:error=EPERM", &arguments) else { return };
+    assert_eq!(said.status, Some(0), "{}", said.err);
+    assert!(bytes(&place, "o.csv") == bytes(&place, "r.csv"), "{}", said.err);
+    let names =
+        std::fs::read_dir(place.path("")).expect("ours").map(|entry| entry.expect("ours").file_name());
+    let left: Vec<_> = names.filter(|name| name.to_string_lossy().ends_with(".part")).collect();
+    assert!(left.is_empty(), "{left:?}");
+}
+
 #[test]
 fn a_recording_for_which_there_is_too_little_memory_ends_with_words_and_not_with_a_panic() {
     let place = workplace();
@@ -224,6 +270,39 @@ fn pictures_for_which_there_is_too_little_memory_or_are_too_few_threads_are_a_fa
         assert!(is_told, "{processes}: {}", said.err);
         // It had waited for half a minute.
         assert!(begun.elapsed() < Duration::from_secs(25), "{processes}: {:?}", begun.elapsed());
+    }
+}
+
+#[test]
+fn pictures_without_a_graphics_library_are_a_fault_and_the_run_goes_to_its_end() {
+    let place = workplace();
+    // No library, though it is called so.
+    place.write("libEGL.so.1", "");
+    let mut program = place.phantom3();
+    program.args(RUN).args(["0.1", "--snapshot", "0.05:p.png", "--record", "o.csv"]);
+    program.env("LD_LIBRARY_PATH", place.path(""));
+    let said = Running::start(program).wait();
+    assert_eq!(said.status, Some(3), "{}{}", said.out, said.err);
+    assert!(said.err.contains("no pictures: ") && said.err.contains("apt install libegl1"), "{}", said.err);
+    assert!(said.out.contains("pictures     0, 1 MISSING NOT COMPLETE"), "{}", said.out);
+    assert!(said.out.contains("o.csv (100 rows)"), "{}", said.out);
+}
+
+#[test]
+fn pictures_for_which_too_few_files_may_be_open_are_told_with_the_limit() {
+    let place = workplace();
+    let picture = [&RUN[..], &["0.1", "--snapshot", "0.05:p.png"]].concat();
+    if place.run(&picture).err.contains("no pictures: ") {
+        eprintln!("skipped: this machine cannot draw");
+        return;
+    }
+    let files = ["--record", "1.mcap", "--record", "2.csv", "--record", "3.csv"];
+    for descriptors in 7..20 {
+        let limit = format!("-n {descriptors}");
+        let said = run_limited(&place, &limit, &[&picture[..], &files].concat());
+        assert!(!said.err.contains("apt install"), "{descriptors}: {}", said.err);
+        let is_told = said.status == Some(0) || said.err.contains("ulimit -n") || said.status == Some(127);
+        assert!(is_told, "{descriptors}: {}", said.err);
     }
 }
 

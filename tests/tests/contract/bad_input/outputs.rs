@@ -2,7 +2,7 @@
 
 use super::{BALL, PRECIOUS, SCENE, assert_says, refused, with_recordings, workplace};
 use std::fs;
-use system_tests::workplace::Workplace;
+use system_tests::workplace::{Running, Workplace};
 
 /// A recording and its table, of more than a megabyte.
 fn with_long_recording() -> (Workplace, Vec<u8>) {
@@ -252,4 +252,64 @@ fn a_table_whose_lines_end_in_carriage_returns_alone_is_refused_by_plot_as_by_th
     refused(&place, &["plot", "mac.csv", "--out", "new"]);
     let said = place.run(["plot", "windows.csv", "--svg-only"]);
     assert_eq!((said.status, said.err.as_str()), (Some(0), ""));
+}
+
+/// A shell leads a standard stream into a file that is read or written, too.
+#[test]
+fn no_standard_stream_is_a_file_that_is_read_or_written_besides() {
+    let place = workplace();
+    with_recordings(&place);
+    place.write("orders.csv", "at 0.1 reset\n");
+    let run = "run scene.toml --clock virtual --seconds 0.1";
+    let live = "run scene.toml --clock lockstep --seconds 0.1 --orders -";
+    let cases = [
+        ("good.mcap", "export good.mcap - 1<>good.mcap".to_owned(), "the standard output would overwrite"),
+        ("good.mcap", "export good.mcap /dev/stdout >>good.mcap".to_owned(), "would overwrite the input"),
+        ("scene.toml", format!("{run} --record - >>scene.toml"), "the standard output would overwrite"),
+        ("scene.toml", format!("{run} >>scene.toml"), "the standard output would overwrite"),
+        ("out.csv", format!("{run} --record out.csv --record - >>out.csv"), "the standard output goes to"),
+        ("out.csv", format!("{run} --record out.csv >>out.csv"), "the standard output goes to"),
+        ("out.csv", format!("{run} --events out.csv 1<>out.csv"), "the standard output goes to"),
+        ("orders.csv", format!("{live} --record orders.csv <orders.csv"), "the standard input comes from"),
+        ("orders.csv", format!("{live} --record - <orders.csv >>orders.csv"), "would overwrite the input -"),
+    ];
+    for (file, command, words) in cases {
+        let before = fs::read(place.path(file)).expect("a file");
+        let mut shell = std::process::Command::new("sh");
+        shell.args(["-c", &format!("\"$0\" {command}")]).arg(place.phantom3().get_program());
+        let said = Running::start(place.prepare(shell)).wait();
+        assert_eq!(said.status, Some(2), "{command}: {}", said.err);
+        assert_says(&said.err, &[words]);
+        assert!(fs::read(place.path(file)).expect("a file") == before, "{command}");
+    }
+}
+
+#[test]
+fn a_layout_and_a_figure_whose_links_lead_to_one_place_are_refused() {
+    let place = workplace();
+    place.write("pairs.csv", "0 0 0 0.1 0 0\n0.1 0 0 0.2 0 0\n0 0.1 0 0.1 0.1 0\n0 0 0.1 0.1 0 0.1\n");
+    std::os::unix::fs::symlink("h.svg", place.path("h.toml")).expect("a link");
+    let arguments = ["calibrate", "--pairs", "pairs.csv", "--write", "h.toml", "--plot", "h.svg"];
+    let said = refused(&place, &arguments);
+    assert_says(&said, &["--write and --plot name the same file"]);
+    assert!(!place.path("h.svg").exists());
+}
+
+#[test]
+fn the_recording_of_a_later_scene_that_cannot_be_made_is_the_one_that_is_told() {
+    let place = workplace();
+    place.write("next.toml", SCENE.replace("table", "ground"));
+    place.write("orders.txt", "at 0.1 swap next.toml\n");
+    let held = fs::File::create(place.path("out.2.csv")).expect("room");
+    held.try_lock().expect("nobody else");
+    let run = ["run", "scene.toml", "--clock", "virtual", "--seconds", "0.3", "--orders", "orders.txt"];
+    let said = place.run([&run[..], &["--record", "out.csv", "--record", "other.csv"]].concat());
+    assert_eq!(said.status, Some(3), "{}", said.err);
+    assert_says(&said.err, &["out.2.csv: another process writes it"]);
+    assert_says(&said.out, &["out.2.csv (0 rows) NOT COMPLETE"]);
+    for name in ["out.csv", "other.csv", "other.2.csv"] {
+        let line = said.out.lines().find(|line| line.contains(&format!(" {name} (")));
+        let line = line.unwrap_or_else(|| panic!("{name}: {}", said.out));
+        assert!(!line.contains("NOT") && !line.contains("(0 rows)"), "{line}");
+    }
 }
