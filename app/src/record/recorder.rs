@@ -55,10 +55,10 @@ pub struct Recorded {
 }
 
 impl Recorded {
-    /// A recording for which there is no file; nothing of it was written anywhere.
+    /// A recording for which there is no file, or somebody else's.
     pub fn not_begun(error: &RecordingError) -> Self {
         let (path, failure) = (error.file().into(), Some(error.to_string()));
-        Self { path, rows: 0, unit: "rows", lost: 0, failure, is_as_before: true }
+        Self { path, rows: 0, unit: "rows", lost: 0, failure, is_as_before: false }
     }
 }
 

@@ -317,11 +317,14 @@ fn can_mount(place: &Workplace) -> bool {
 /// Room for what stands before the first tick, and not for the first half second.
 #[test]
 fn a_disk_without_room_for_the_first_rows_leaves_the_earlier_recordings() {
-    let (place, _) = workplace("default");
+    let (place, _) = workplace("lift");
     if !can_mount(&place) {
         return;
     }
-    let mount = "mkdir small && mount -t tmpfs -o size=48k tmpfs small";
+    // A recording of one tick has room for what stands before it, and none for half a second.
+    ran(&place, &["run", "scene.toml", "--clock", "virtual", "--seconds", "0.001", "--record", "one.mcap"]);
+    let room = bytes(&place, "one.mcap").len();
+    let mount = format!("mkdir small && mount -t tmpfs -o size={room} tmpfs small");
     for name in ["out.mcap", "out.csv"] {
         let (begin, end) = (format!("printf earlier >small/{name}"), format!("cp small/{name} {name}"));
         let inside = format!("{mount} && {begin} && \"$0\" \"$@\"; end=$?; {end}; exit $end");

@@ -77,9 +77,9 @@ pub(super) struct Material {
 #[serde(from = "serde_json::Value")]
 pub(super) struct Name(pub(super) Option<String>);
 
-impl From<serde_json::Value> for Name {
-    fn from(value: serde_json::Value) -> Self {
-        Self(if let serde_json::Value::String(text) = value { Some(text) } else { None })
+impl From<Value> for Name {
+    fn from(value: Value) -> Self {
+        Self(if let Value::String(text) = value { Some(text) } else { None })
     }
 }
 
