@@ -30,11 +30,11 @@ impl Mesh {
         }
         let outermost = self.outermost(parts, &volumes);
         let is_turned: Vec<bool> = outermost.iter().map(|&part| is_inward(part)).collect();
-        for part in 0..parts.len() {
-            if is_turned[part] {
+        for (part, is_turned) in is_turned.iter().enumerate() {
+            if *is_turned {
                 report.inside_out.note(parts.first_of_input(part));
             }
-            if is_turned[part] != is_inward(part) {
+            if *is_turned != is_inward(part) {
                 report.cavities.note(parts.first_of_input(part));
             }
         }
