@@ -120,7 +120,7 @@ fn a_shaded_ball_on_bumps_feels_what_each_place_does_and_all_together_no_more_th
         let [flat, round] = &felt;
         assert_eq!(flat.len(), round.len());
         let [flat_n, round_n] = felt.each_ref().map(|felt| felt.iter().sum::<Vector3<f64>>().norm());
-        let [flat_sum, round_sum] = felt.each_ref().map(|felt| felt.iter().map(|f| f.norm()).sum::<f64>());
+        let [flat_sum, round_sum] = felt.each_ref().map(|felt| felt.iter().map(Vector3::norm).sum::<f64>());
         if flat_sum == 0.0 {
             continue;
         }
