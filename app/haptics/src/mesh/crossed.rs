@@ -31,6 +31,7 @@ impl Mesh {
     }
 
     /// Visits each pair of faces that pass through each other once; says whether these are all.
+    #[inline(always)]
     pub(super) fn for_each_crossed_pair(&self, mut visit: impl FnMut([usize; 2])) -> bool {
         let slack_m = TOUCHING * self.extent_m;
         let mut left = MOST_PAIRS.saturating_mul(self.faces.len());
@@ -50,6 +51,7 @@ impl Mesh {
 }
 
 /// Whether two triangles have a common point, or cannot be told from such by as much as `slack_m`.
+#[inline(always)]
 pub(super) fn do_cross(corners: &[[Vector3<f64>; 3]; 2], normals: &[Vector3<f64>; 2], slack_m: f64) -> bool {
     // From one of them, so that nothing is rounded as what is far from the origin.
     let origin = corners[0][0];

@@ -69,13 +69,13 @@ pub(crate) fn stand(mesh: &Mesh, mut place: Place, input: &ConeInput) -> Option<
     for _ in 0..MAX_FLIGHTS {
         if let Some(mut on) = facing(mesh, place, hip_B) {
             if mesh.faces[place.face() as usize].is_beside {
-                if let On::Crossing(side, other) = on
-                    && let Some(next) = crack::off_crossing(mesh, &place.point_B, [side, other], &hip_B)
-                {
-                    place = next;
-                    continue;
+                match held_beside(mesh, &place, on, &hip_B) {
+                    Held::By(other) => on = other,
+                    Held::Over(next) => {
+                        place = next;
+                        continue;
+                    }
                 }
-                on = crack::but_no_wall(mesh, &place, on, &hip_B);
             }
             let (normal_B, offset_m) = match on {
                 On::Face(side) => plane_of_face(mesh, side),
@@ -90,15 +90,41 @@ pub(crate) fn stand(mesh: &Mesh, mut place: Place, input: &ConeInput) -> Option<
             place = rim;
             continue;
         }
-        let is_beside = mesh.faces[place.face() as usize].is_beside;
-        place = match if is_beside { crack::beyond(mesh, place, &hip_B) } else { None } {
-            Some(Beyond::Near) => return Some(at_rest_at(mesh, place, input)),
-            Some(Beyond::At(place)) => place,
-            None => fly(mesh, place, hip_B)
-                .filter(|landed| !is_beside || !crack::is_in_crack(mesh, &place.point_B, landed, &hip_B))?,
-        };
+        match leave(mesh, place, hip_B)? {
+            Beyond::At(next) => place = next,
+            Beyond::Near => return Some(at_rest_at(mesh, place, input)),
+        }
     }
     None
+}
+
+/// What holds the HIP back beside another part, or where the surface goes on there.
+enum Held {
+    By(On),
+    Over(Place),
+}
+
+#[cold]
+#[inline(never)]
+fn held_beside(mesh: &Mesh, place: &Place, on: On, hip_B: &Vector3<f64>) -> Held {
+    if let On::Crossing(side, other) = on
+        && let Some(next) = crack::off_crossing(mesh, &place.point_B, [side, other], hip_B)
+    {
+        return Held::Over(next);
+    }
+    Held::By(crack::but_no_wall(mesh, place, on, hip_B))
+}
+
+/// Off the surface: over a crack, or on to what is met in flight; `None`: free.
+#[inline(never)]
+fn leave(mesh: &Mesh, place: Place, hip_B: Vector3<f64>) -> Option<Beyond> {
+    let is_beside = mesh.faces[place.face() as usize].is_beside;
+    if is_beside && let Some(beyond) = crack::beyond(mesh, place, &hip_B) {
+        return Some(beyond);
+    }
+    let landed = fly(mesh, place, hip_B)?;
+    let is_past = is_beside && crack::is_in_crack(mesh, &place.point_B, &landed, &hip_B);
+    (!is_past).then_some(Beyond::At(landed))
 }
 
 /// On an edge or a vertex that holds the HIP back though it lies beyond: above a crack.

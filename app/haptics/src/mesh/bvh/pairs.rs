@@ -31,6 +31,7 @@ impl Part {
 impl<const WIDTH: usize> Bvh<WIDTH> {
     /// Visits pairs of faces, by their numbers, whose runs have boxes that overlap, or nearly by this gap \[m\], each pair once, until `visit` says
     /// `false`; says whether it never did.
+    #[inline(always)]
     pub(in crate::mesh) fn for_each_pair(&self, gap_m: f64, mut visit: impl FnMut(u32, u32) -> bool) -> bool {
         // Differences of bounds are rounded, too.
         let gap = if gap_m > 0.0 { (2.0 * gap_m + 1e-6 * self.extent_m()) as f32 } else { 0.0 };
