@@ -84,7 +84,7 @@ impl<'a> Output<'a> {
         }
     }
 
-    /// Whether it would be written over this file.
+    /// True if it would be written over this file.
     fn replaces(&self, other: &Path) -> bool {
         match self.kind {
             Kind::Film => is_frame_in(self.file, other),
@@ -92,7 +92,7 @@ impl<'a> Output<'a> {
         }
     }
 
-    /// Whether both would be written to the same place.
+    /// True if both would be written to the same place.
     fn meets(&self, other: &Self) -> bool {
         match (self.kind, other.kind) {
             (Kind::Film, Kind::Film) => false,
@@ -103,7 +103,7 @@ impl<'a> Output<'a> {
     }
 }
 
-/// Whether a film into this directory may have a picture of this name, by whichever links.
+/// True if a film into this directory may have a picture of this name, by whichever links.
 fn is_frame_in(directory: &Path, file: &Path) -> bool {
     let place = place_of(file);
     let is_frame = |name: &str| {
@@ -152,7 +152,7 @@ fn check_standard_output(inputs: &[&PathBuf]) -> Result<(), RunFailure> {
     refused(format_args!("the standard output would overwrite the input {input}; send it to another file"))
 }
 
-/// What a shell has led into the same file would be written or read there, too.
+/// Refusal of an output into whose file a shell has led a standard stream: both would be written or read there.
 fn refuse_stream(Output { option, file, kind }: &Output<'_>) -> Result<(), RunFailure> {
     if is_standard_output(file) || *kind == Kind::Film {
         return Ok(());

@@ -23,7 +23,7 @@ pub enum RecordingError {
     Create {
         /// Which.
         file: PathBuf,
-        /// What the system said.
+        /// The system's error.
         source: io::Error,
     },
     /// Nobody could write it.
@@ -63,7 +63,7 @@ pub enum RecordingError {
     NotBegun {
         /// Which.
         file: PathBuf,
-        /// What the system said.
+        /// The system's error.
         source: io::Error,
     },
     /// It cannot be written any further.
@@ -73,7 +73,7 @@ pub enum RecordingError {
     Write {
         /// Which.
         file: PathBuf,
-        /// What the system said.
+        /// The system's error.
         source: io::Error,
         /// Time of the last row on disk.
         until_s: f64,

@@ -280,7 +280,7 @@ impl Rig {
         model_files(&self.scene)
     }
 
-    /// Whether such a file is not what was read of it any more.
+    /// True for such a file that is not what was read of it any more.
     pub fn has_changed(&self, model_file: &Path) -> bool {
         self.versions.get(model_file).copied() != FileVersion::of(model_file)
     }

@@ -315,7 +315,7 @@ fn run_two_processes(rig: &Rig, plan: &RunPlan, signals: &StopSignals) -> Result
     Ok((report, end.stop))
 }
 
-/// What a recording that is to have all inputs of the run lacks of them.
+/// Inputs of the run that a recording which is to have all of them lacks.
 fn left_out(plan: &RunPlan, about: &About) -> Vec<String> {
     if !plan.record.iter().any(|file| RunFormat::of(file) == Ok(RunFormat::Mcap)) {
         return Vec::new();

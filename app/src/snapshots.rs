@@ -80,7 +80,7 @@ pub struct Drawn {
     pub not_reached: usize,
     /// Pictures that a fault cost.
     pub missing: u64,
-    /// What went wrong, which has been told: a file that could not be written, a limit, a machine that cannot draw.
+    /// Fault that has been told: a file that could not be written, a limit, a machine that cannot draw.
     pub failure: Option<String>,
 }
 

@@ -11,6 +11,8 @@ mod listeners;
 mod places;
 mod prompt;
 mod stopping;
+#[cfg(test)]
+mod told;
 mod zero;
 
 use crate::config::DriverConfig;

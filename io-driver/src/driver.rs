@@ -84,7 +84,7 @@ pub enum RunError {
     /// A thread is missing.
     #[error("cannot {what}: {}", rt_core::limits::no_thread(.source))]
     NoThread {
-        /// What it was to do.
+        /// Task of the thread.
         what: &'static str,
         /// The system's error.
         source: io::Error,

@@ -8,7 +8,7 @@ use nix::errno::Errno;
 use nix::sys::resource::{RLIM_INFINITY, Resource, getrlimit};
 use std::io;
 
-/// What is short where no thread could be started, and what to do. The kernel and the C library give the same error
+/// Lack because of which no thread could be started, and its remedy. The kernel and the C library give the same error
 /// for too many processes and for too little memory.
 #[must_use]
 pub fn no_thread(error: &io::Error) -> String {
@@ -22,7 +22,7 @@ pub fn no_thread(error: &io::Error) -> String {
     format!("no thread could be started ({error}); {remedy}")
 }
 
-/// What to do about an error that tells of a limit; `None`: it tells of something else.
+/// Remedy for an error that tells of a limit; `None`: it tells of something else.
 #[must_use]
 pub fn remedy(error: &io::Error) -> Option<String> {
     let raise = |what: String| Some(format!("raise the limit {what}"));

@@ -102,7 +102,7 @@ pub enum SegmentError {
     },
 }
 
-/// What to do where a limit of this process is the cause; else nothing.
+/// Remedy where a limit of this process is the cause; else nothing.
 pub(crate) fn remedy(error: &io::Error) -> &'static str {
     match error.raw_os_error().map(Errno::from_raw_os_error) {
         Some(Errno::FBIG) => "; raise the limit of the size of files (`ulimit -f`, LimitFSIZE=)",

@@ -89,7 +89,7 @@ pub struct Mesh {
     sides: Sides,
     /// Whether any part is closed.
     has_inside: bool,
-    /// Whether any part lies beside another one.
+    /// Presence of a part that lies beside another one.
     has_cracks: bool,
     extent_m: f64,
     /// Of all meshes that this process has built, which. An address would be another mesh's as soon as this one is gone.

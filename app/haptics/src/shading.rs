@@ -139,7 +139,7 @@ impl Shading {
         }
     }
 
-    /// What the places that a ball touches do to the user, turned.
+    /// Shares of the places that a ball touches, turned.
     #[inline(never)]
     pub(crate) fn turned_shares(
         &self,

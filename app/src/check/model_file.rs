@@ -51,7 +51,7 @@ const EXIT_NOT_WRITTEN: u8 = 3;
 
 /// Why there is nothing to tell.
 enum NotUnderstood {
-    /// What was asked does not fit, whatever the model is.
+    /// Unfit request, whatever the model is.
     Options(String),
     Model(String),
 }

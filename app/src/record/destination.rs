@@ -129,11 +129,11 @@ pub fn is_standard_output(file: &Path) -> bool {
 /// A standard stream of this process that a shell may have led into a file.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Stream {
-    /// What is read.
+    /// Standard input.
     Input,
-    /// What a table or a report is written to.
+    /// Standard output, for a table or a report.
     Output,
-    /// What is told meanwhile.
+    /// Standard error, for words meanwhile.
     Error,
 }
 
@@ -152,13 +152,13 @@ impl Stream {
         [Self::Output, Self::Error, Self::Input].into_iter().find(|stream| stream.is(file))
     }
 
-    /// Whether it is this regular file.
+    /// True if it is this regular file.
     pub fn is(self, file: &Path) -> bool {
         let named = file.metadata().ok().map(|file| (file.dev(), file.ino()));
         named.is_some() && named == self.identity()
     }
 
-    /// Whether both are one regular file.
+    /// True if both are one regular file.
     pub fn is_also(self, other: Self) -> bool {
         self.identity().is_some_and(|identity| other.identity() == Some(identity))
     }
@@ -191,7 +191,7 @@ pub fn is_same_place(a: &Path, b: &Path) -> bool {
     }
 }
 
-/// Where a file of this name is, or would be made: at the end of all links, also of one that leads to nothing yet.
+/// Place at which a file of this name is, or would be made: at the end of all links, also of one that leads to nothing yet.
 pub fn place_of(path: &Path) -> PathBuf {
     let mut place = path.to_path_buf();
     for _ in 0..MOST_LINKS {

@@ -446,7 +446,7 @@ fn into_io(error: McapError) -> io::Error {
     if let McapError::Io(error) = error { error } else { io::Error::other(error) }
 }
 
-/// What a recording and what it is written by both see of its beginning.
+/// State of a recording's beginning, shared with its writer.
 #[derive(Debug, Default)]
 struct Beginning {
     /// The file has its earlier content still.

@@ -32,7 +32,7 @@ pub struct Opened {
     before: Before,
 }
 
-/// How a file was before, and is again with this value.
+/// Former state of a file, which it has again with this value.
 #[derive(Debug, Clone, PartialEq, Eq)]
 enum Before {
     /// A stream; or it was started, and stays.
@@ -121,7 +121,7 @@ impl Opened {
         !is_standard_output(&self.path) && !output_file::has_no_name(&self.file)
     }
 
-    /// What beginning it costs if it is in vain: nothing of a stream, its place of a file that is empty, else its content.
+    /// Loss from beginning it in vain: nothing of a stream, its place of a file that is empty, else its content.
     fn at_stake(&self) -> AtStake {
         match &self.before {
             Before::Stays => AtStake::Nothing,
@@ -179,7 +179,7 @@ impl Opened {
         self.file.try_clone()
     }
 
-    /// What it is written by.
+    /// Handle that it is written by.
     pub(super) fn file(&self) -> &File {
         &self.file
     }

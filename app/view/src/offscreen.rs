@@ -24,7 +24,7 @@ pub enum NoPictures {
     /// It is, and has nothing to draw with.
     #[error("no pictures: libEGL {step} ({reason}); {REMEDY}")]
     NoContext {
-        /// What it did not do.
+        /// Step that failed.
         step: &'static str,
         /// In its words.
         reason: String,
@@ -32,7 +32,7 @@ pub enum NoPictures {
     /// A limit of this process is the likely cause.
     #[error("no pictures: libEGL {step} ({reason}); it may lack memory: raise the limit {limit}")]
     Memory {
-        /// What it did not do.
+        /// Step that failed.
         step: &'static str,
         /// In its words.
         reason: String,
@@ -42,14 +42,14 @@ pub enum NoPictures {
     /// The same, of files.
     #[error("no pictures: libEGL {step} ({reason}); {remedy}")]
     Files {
-        /// What it did not do.
+        /// Step that failed.
         step: &'static str,
         /// In its words.
         reason: String,
         /// In words.
         remedy: String,
     },
-    /// What draws in software would wait for ever for those of its threads that it did not get.
+    /// Lack of threads: drawing in software would wait for ever for those that it did not get.
     #[error("no pictures: {0}")]
     Threads(String),
     /// There is a context, and it cannot do what is needed.
@@ -160,7 +160,7 @@ fn failed(step: &'static str) -> impl Fn(egl::Error) -> NoPictures {
     }
 }
 
-/// What a limit of this process has likely kept from being done, or the reason again.
+/// Failure that a limit of this process has likely caused, or the reason again.
 fn of_a_limit(step: &'static str, reason: String) -> Result<NoPictures, String> {
     if let Some(remedy) = missing_files() {
         return Ok(NoPictures::Files { step, reason, remedy });
@@ -174,7 +174,7 @@ fn of_a_limit(step: &'static str, reason: String) -> Result<NoPictures, String> 
 /// So many files a graphics library has open at once while it is loaded, about.
 const MOST_LOADING_FILES: usize = 8;
 
-/// What to do where this process may not open so many.
+/// Remedy where this process may not open so many.
 fn missing_files() -> Option<String> {
     let opened = (0..MOST_LOADING_FILES).map(|_| File::open("/dev/null")).collect::<io::Result<Vec<_>>>();
     limits::remedy(&opened.err()?)

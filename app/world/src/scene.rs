@@ -54,7 +54,7 @@ pub struct Scene {
     pub templates: Vec<SceneTemplate>,
     /// The files that it includes, in the order in which they were read.
     pub included: Vec<PathBuf>,
-    /// What its own file has.
+    /// Text of its own file.
     pub text: SceneText,
 }
 

@@ -13,7 +13,7 @@ use std::path::Path;
 use std::process::ExitCode;
 use std::time::{Duration, Instant};
 
-/// How long the loop may take to do what it was asked, beyond a few ticks.
+/// Time for the loop to do what it was asked, beyond a few ticks.
 pub(super) const PROMPT: Duration = Duration::from_millis(100);
 /// Between two looks at the frames.
 pub(super) const LOOK: Duration = Duration::from_millis(1);
@@ -89,29 +89,11 @@ fn seen_after(driver: &DriverView) -> Option<Seen> {
 
 #[cfg(test)]
 mod tests {
+    use super::super::told::memory;
     use super::*;
     use bytemuck::Zeroable;
     use patience::prelude::*;
     use shm_abi::DriverMemory;
-    use shm_abi::doorbell::WaitMode;
-    use shm_abi::segment::{ClockMode, DriverInfo};
-
-    fn memory() -> DriverMemory {
-        let info = DriverInfo {
-            period_ns: 1_000_000,
-            reply_budget_ns: 500_000,
-            max_command_age_ticks: 4,
-            ramp_in_ticks: 20,
-            ramp_out_ticks: 5,
-            clock_mode: ClockMode::Real,
-            wait_mode: WaitMode::Futex,
-            is_commissioning: false,
-            cpu: None,
-            devices: Vec::new(),
-            setup_report: String::new(),
-        };
-        DriverMemory::create(&info).expect("memory")
-    }
 
     fn tell(memory: &DriverMemory, tick: u64, state: DriverState) {
         let fault = if state == DriverState::Fault { FaultReason::EmergencyStop } else { FaultReason::None };

@@ -44,7 +44,7 @@ pub(super) fn end_lease(socket: &Path) -> ExitCode {
     ExitCode::SUCCESS
 }
 
-/// Whether a frame of another lease, or of none, comes in time: the loop takes note with its next tick.
+/// True once a frame is of another lease, or of none, if one comes in time: the loop takes note with its next tick.
 fn has_ended(driver: &DriverView, lease: u64) -> bool {
     let until = Instant::now() + PROMPT + Duration::from_nanos(driver.info().period_ns) * 5;
     while driver.read_latest().is_none_or(|frame| frame.lease == lease) {
@@ -58,29 +58,15 @@ fn has_ended(driver: &DriverView, lease: u64) -> bool {
 
 #[cfg(test)]
 mod tests {
+    use super::super::told::memory;
     use super::*;
     use bytemuck::Zeroable;
-    use shm_abi::doorbell::WaitMode;
-    use shm_abi::segment::{ClockMode, DriverInfo};
-    use shm_abi::{DriverMemory, Frame};
+    use shm_abi::Frame;
 
     /// The loop hangs, or the machine keeps it from running: what stands there is from before.
     #[test]
     fn a_lease_has_ended_once_a_frame_is_of_another_one() {
-        let info = DriverInfo {
-            period_ns: 1_000_000,
-            reply_budget_ns: 500_000,
-            max_command_age_ticks: 4,
-            ramp_in_ticks: 20,
-            ramp_out_ticks: 5,
-            clock_mode: ClockMode::Real,
-            wait_mode: WaitMode::Futex,
-            is_commissioning: false,
-            cpu: None,
-            devices: Vec::new(),
-            setup_report: String::new(),
-        };
-        let memory = DriverMemory::create(&info).expect("memory");
+        let memory = memory();
         let driver = DriverView::map(memory.fd()).expect("our own");
         for (tick, lease, ended) in [(7, 3, false), (8, 3, false), (9, 0, true), (10, 4, true)] {
             memory.write_frame(&Frame { tick, lease, ..Frame::zeroed() });

@@ -132,7 +132,7 @@ impl DriverView {
         Ok(Self { map, frame_words, file: [found.st_dev, found.st_ino] })
     }
 
-    /// Whether this is the memory of the same driver, and not of one that was started after it.
+    /// True for the memory of the same driver, and not of one that was started after it.
     pub fn is_same_driver(&self, other: &Self) -> bool {
         self.file == other.file
     }

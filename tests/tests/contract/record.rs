@@ -294,7 +294,7 @@ fn a_file_that_may_not_grow_any_more_does_not_end_the_run() {
     check_full_disk(&place, &said, "File too large", "200201 answered");
 }
 
-/// Whether these processes can have a disk of their own, which only they see; that they cannot is told.
+/// True if these processes can have a disk of their own, which only they see; that they cannot is told.
 fn can_mount(place: &Workplace) -> bool {
     let mut possible = place.prepare(Command::new("unshare"));
     possible.args([

@@ -342,7 +342,7 @@ fn a_live_calibration_that_cannot_begin_leaves_earlier_pairs() {
     assert!(said.status == Some(2) && said.err.contains("none/pairs.csv"), "{}", said.err);
 }
 
-/// What a user waits for at most, with a machine that does something else besides.
+/// Longest wait of a user, with a machine that does something else besides.
 const SOON: Duration = Duration::from_secs(20);
 
 #[test]

@@ -205,15 +205,21 @@ fn a_run_whose_lease_somebody_ended_says_so_and_does_not_come_back() {
     }
 }
 
+/// An application that has force.
+fn pushed_app() -> (Press, Running) {
+    let press = Press::start("real");
+    let holder = press.start_app();
+    RingLog::begin(&press.observer.driver).follow_to_force(&press.observer.driver);
+    (press, holder)
+}
+
 /// A machine that stalls for some tenths of a second as the lease ends: what is there afterwards is the same driver.
 #[test]
 fn a_run_whose_lease_somebody_ended_does_not_come_back_to_a_driver_that_stood_still_meanwhile() {
     for pause_ms in [1, 2, 3, 4, 6] {
-        let mut press = Press::start("real");
-        let mut holder = press.start_app();
-        RingLog::begin(&press.observer.driver).follow_to_force(&press.observer.driver);
-        let driver = rustix::process::Pid::from_child(&press.driver.child);
-        let signal = |signal| rustix::process::kill_process(driver, signal).expect("our own child");
+        let (mut press, mut holder) = pushed_app();
+        let driver = press.driver.child.id();
+        let signal = |signal| send(driver, signal);
         signal(rustix::process::Signal::STOP);
         let socket = press.driver.socket().to_path_buf();
         let asking = std::thread::spawn(move || shm_abi::client::end_lease(&socket, "test"));
@@ -235,15 +241,12 @@ fn a_run_whose_lease_somebody_ended_does_not_come_back_to_a_driver_that_stood_st
 /// The request is served by a thread of its own; whether the loop took note, a frame tells.
 #[test]
 fn a_lease_is_not_told_as_ended_before_a_frame_shows_it() {
-    let mut press = Press::start("real");
-    let mut holder = press.start_app();
-    RingLog::begin(&press.observer.driver).follow_to_force(&press.observer.driver);
-    let driver = rustix::process::Pid::from_child(&press.driver.child);
-    let signal = |signal| rustix::process::kill_process(driver, signal).expect("our own child");
-    signal(rustix::process::Signal::STOP);
+    let (mut press, mut holder) = pushed_app();
+    let driver = press.driver.child.id();
+    send(driver, rustix::process::Signal::STOP);
     let asked = io_driver(&["end-lease"], press.driver.socket());
     assert_eq!((asked.status, &*asked.out), (Some(2), ""), "{asked:?}");
-    signal(rustix::process::Signal::CONT);
+    send(driver, rustix::process::Signal::CONT);
     let asked = io_driver(&["end-lease"], press.driver.socket());
     assert_eq!(asked.status, Some(0), "{asked:?}");
     assert_eq!(holder.end().status, Some(3));

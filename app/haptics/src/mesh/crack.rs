@@ -8,7 +8,7 @@
 //! it by twice that width, and down again. If nothing is in the way and the way down meets a face that looks the same way, the
 //! surface goes on there. As long as the HIP is above the crack, not as far as that step, the god-object rests at the edge;
 //! then it goes over. Going back is the same, so there is no point from which both parts are left in turn.
-//! Where parts overlap, the wall of one stands in the way over the other: if it is no higher than a step, the walk goes on upon
+//! Overlapping parts: the wall of one stands in the way over the other; if it is no higher than a step, the walk goes on upon
 //! it.
 //! Walls in a crack hold nothing: at an edge, a face that is none has precedence, and a flight that comes to the rim of one
 //! leads past. A wall is in a crack if 1.5 times [`widest_m`] in front of it is inside of a part.
@@ -16,9 +16,9 @@
 //!
 //! Frames and signs: object frame B; `out` is along a face, away from it.
 //! Invariant: whatever is passed over is narrower than twice [`widest_m`] and lower than 1.5 times that.
-//! Limit: where walls coincide to the bit, a finger that is lifted off right above them, within a step, may come to one of them, as it
-//! did without all this (one in 2000 of the test's assemblies). A part that hovers above the face of another one, nearer than that but without touching it, stands in nobody's way
-//! along that face: a point slides in below.
+//! Limit: where walls coincide to the bit, a finger that is lifted off right above them, within a step, may come to one of
+//! them, as it did without all this (one in 2000 of the test's assemblies). A part that hovers above the face of another one,
+//! nearer than that but without touching it, stands in nobody's way along that face: a point slides in below.
 //! Cost: nothing where no other part is near ([`beside`](super::beside)); else up to five questions to the hierarchy for each
 //! direction, at most [`MOST_WAYS`], where an edge or a vertex lets the HIP go, and one where it holds.
 
@@ -30,7 +30,7 @@ use super::place::{Facet, On, Place, Side, previous};
 use super::walk::RIM;
 use super::{Hit, Mesh};
 
-/// Where a surface goes on beyond an edge.
+/// Place beyond an edge at which a surface goes on.
 pub(super) enum Beyond {
     /// Nearer than a step: the HIP is above the crack.
     Near,
@@ -38,7 +38,7 @@ pub(super) enum Beyond {
     At(Place),
 }
 
-/// Whether the surface that ends at an edge or a vertex, and behind which the HIP lies, goes on with another part.
+/// Continuation, on another part, of a surface that ends at an edge or a vertex and behind which the HIP lies.
 #[cold]
 pub(super) fn beyond(mesh: &Mesh, place: Place, hip_B: &Vector3<f64>) -> Option<Beyond> {
     let (mut is_near, mut farthest) = (false, None);
@@ -148,8 +148,9 @@ pub(super) fn over_ledge(
     }
 }
 
-/// Whether a wall, or a face that is at most two edges away, is parallel to a face: another part's foot that comes out of it aslant
-/// is no ledge, however low it is there. Or whether it is folded: of two walls without a gap, whose tops are joined.
+/// True for a wall that is parallel to a face, or from which a parallel face is at most two edges away: another part's foot
+/// that comes out of it aslant is no ledge, however low it is there. Or for one that is folded: of two walls without a gap,
+/// whose tops are joined.
 fn is_flush(mesh: &Mesh, wall: Side, normal_B: &Vector3<f64>) -> bool {
     let across =
         |side: Side| Facet::of(mesh, side).face.links.iter().filter_map(move |link| side.across(*link));
@@ -176,7 +177,7 @@ pub(super) fn off_crossing(
     })
 }
 
-/// Whether a flight of who is outside came at once to a wall in a crack, at its rim: it leads past.
+/// True for a flight from outside that came at once to a wall in a crack, at its rim: it leads past.
 #[cold]
 pub(super) fn is_in_crack(mesh: &Mesh, from_B: &Vector3<f64>, place: &Place, hip_B: &Vector3<f64>) -> bool {
     let facet = Facet::of(mesh, place.on.side());
@@ -191,7 +192,7 @@ pub(super) fn is_in_crack(mesh: &Mesh, from_B: &Vector3<f64>, place: &Place, hip
         && !mesh.is_inside(&(within_B + facet.normal_B * (RIM * mesh.extent_m)))
 }
 
-/// Where a path that ends in a crack, or at a wall in it, met the surface that the crack is in; `None` if it is in none.
+/// Place at which a path that ends in a crack, or at a wall in it, met the surface that the crack is in; `None` if it is in none.
 #[cold]
 pub(super) fn mouth(
     mesh: &Mesh,
@@ -223,7 +224,7 @@ pub(super) fn mouth(
     is_beside.then(|| Place::hit(&met))
 }
 
-/// Whether another part is so near in front of a wall, and faces it, that there is no crack to a finger, or hides it.
+/// True if another part is so near in front of a wall, and faces it, that there is no crack to a finger, or hides it.
 fn has_part_before(mesh: &Mesh, at_B: &Vector3<f64>, normal_B: &Vector3<f64>) -> bool {
     let before_B = at_B + normal_B * (STEP * widest_m(mesh.extent_m));
     mesh.is_inside(&before_B)
@@ -232,8 +233,8 @@ fn has_part_before(mesh: &Mesh, at_B: &Vector3<f64>, normal_B: &Vector3<f64>) ->
             .is_none_or(|hit| Facet::of(mesh, Place::hit(&hit).on.side()).normal_B.dot(normal_B) < -ALIKE)
 }
 
-/// What holds the HIP back at an edge or a vertex: not a wall in a crack, if there is a face beside it that is none and behind
-/// which the HIP lies, too.
+/// Feature that holds the HIP back at an edge or a vertex: not a wall in a crack, if there is a face beside it that is none and
+/// behind which the HIP lies, too.
 #[cold]
 pub(super) fn but_no_wall(mesh: &Mesh, place: &Place, on: On, hip_B: &Vector3<f64>) -> On {
     if place.on == on {
@@ -276,7 +277,7 @@ pub(super) fn but_no_wall(mesh: &Mesh, place: &Place, on: On, hip_B: &Vector3<f6
     better.map_or(on, On::Face)
 }
 
-/// Whether a face is a wall in a crack, as seen from a little within it.
+/// True for a face that is a wall in a crack, as seen from a little within it.
 fn is_wall(mesh: &Mesh, facet: &Facet<'_>, edges: [usize; 2], at_B: &Vector3<f64>) -> bool {
     let inward = |edge: usize| {
         let (_, edge_B) = facet.edge_B(mesh, edge);
@@ -287,7 +288,7 @@ fn is_wall(mesh: &Mesh, facet: &Facet<'_>, edges: [usize; 2], at_B: &Vector3<f64
     has_part_before(mesh, &within_B, &facet.normal_B)
 }
 
-/// How far up a step leads, in widths of the widest crack: over a ledge of that height.
+/// Height of a step, in widths of the widest crack: over a ledge of that height.
 const STEP: f64 = 1.5;
 /// Directions that are tried from a vertex.
 const MOST_WAYS: usize = 5;

@@ -22,7 +22,7 @@ pub struct Face {
     pub sides: Sides,
     /// Whether other faces of closed parts pass through it, of which no link tells.
     pub is_crossed: bool,
-    /// Whether another closed part lies beside it, touching or with a crack between them that no finger feels.
+    /// Presence of another closed part beside it, touching or with a crack between them that no finger feels.
     pub is_beside: bool,
 }
 

@@ -69,7 +69,7 @@ fn on_edge(mesh: &Mesh, side: Side, edge: usize, point_B: Vector3<f64>, hip_B: V
     }
 }
 
-/// Whether two faces that lie upon each other are a groove without room, not a plate without thickness: their planes cannot tell.
+/// True for two faces upon each other that are a groove without room, not a plate without thickness: their planes cannot tell.
 /// At the bottom of a groove, who has left it is inside.
 #[cold]
 fn is_groove(mesh: &Mesh, hip_B: &Vector3<f64>) -> bool {

@@ -25,7 +25,7 @@ pub(super) const TOLD: usize = 3;
 /// Holes that stay open: loops of edges of one face each.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct OpenHoles {
-    /// How many.
+    /// Number of them.
     pub count: usize,
     /// The largest few, the largest first.
     pub largest: [Option<OpenHole>; TOLD],
@@ -65,7 +65,7 @@ fn short(number: f64) -> f64 {
 /// Faces of closed parts that lie beside other parts, without a gap or with one that no finger feels.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct NarrowGaps {
-    /// How many.
+    /// Number of them.
     pub faces: usize,
     /// The widest such gap (m).
     pub widest_m: f64,

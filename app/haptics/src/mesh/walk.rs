@@ -98,7 +98,7 @@ pub(crate) fn stand(mesh: &Mesh, mut place: Place, input: &ConeInput) -> Option<
     None
 }
 
-/// What holds the HIP back beside another part, or where the surface goes on there.
+/// Feature that holds the HIP back beside another part, or the place at which the surface goes on there.
 enum Held {
     By(On),
     Over(Place),
@@ -310,7 +310,7 @@ fn fly(mesh: &Mesh, place: Place, hip_B: Vector3<f64>) -> Option<Place> {
     hit.map(|hit| Place::hit(&hit))
 }
 
-/// What a flight leaves.
+/// Surface that a flight leaves.
 struct Left<'m> {
     mesh: &'m Mesh,
     on: On,

@@ -5,7 +5,7 @@
 //! 2. A part on which that is impossible (a Klein bottle, a Moebius strip) stays as it was, and its links say
 //!    where the winding changes.
 //!
-//! Which way a closed part looks is decided later ([`nesting`](super::nesting)).
+//! Inside and outside of closed parts are decided later ([`nesting`](super::nesting)).
 //!
 //! Cost: linear.
 
@@ -21,7 +21,7 @@ pub(super) struct Parts {
 }
 
 impl Parts {
-    /// Which part a face belongs to.
+    /// Part of a face.
     pub(super) fn of(&self, face: usize) -> usize {
         self.of_face[face] as usize
     }

@@ -19,7 +19,7 @@ struct Tiles {
     report: MeshReport,
     /// Tiles' frame to the mesh's.
     X_BT: Isometry3<f64>,
-    /// Where the cracks are: of each row in x, and between the rows in z.
+    /// Places of the cracks: of each row in x, and between the rows in z.
     x_m: [f64; 2],
     z_m: f64,
     /// Widths of the cracks, and how much lower than y = 0 the tops are.
@@ -139,7 +139,7 @@ impl Tiles {
 #[test]
 fn a_point_slides_over_hairline_cracks_as_over_one_surface() {
     let (mut touched, mut wrong) = (0, Vec::new());
-    // Of twenty times as many one was wrong: see the limit in `crack.rs`.
+    // Of ten times as many one was wrong: see the limit in `crack.rs`.
     for seed in 0..200 {
         let mut noise = Noise(seed);
         let tiles = Tiles::new(&mut noise);

@@ -16,7 +16,7 @@ struct Plate {
     thickness_m: f64,
 }
 
-/// How its two layers hang together.
+/// Link between its two layers.
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Kind {
     /// A closed box, both layers cut along the same diagonal.
@@ -56,7 +56,7 @@ impl Plate {
         self.X_BP.inverse_transform_point(&Point3::from(*p_B)).coords
     }
 
-    /// How far its foot is within the rim (m).
+    /// Distance of its foot from the rim, within (m).
     fn within_m(&self, p: &Vector3<f64>) -> f64 {
         (self.half_m[0] - p.x.abs()).min(self.half_m[1] - p.z.abs())
     }

@@ -67,7 +67,7 @@ pub(crate) fn first_fraction(mesh: &Mesh, from: &Vector3<f64>, to: &Vector3<f64>
     fractions.min_by(f64::total_cmp)
 }
 
-/// How often the closed parts of a mesh go around a point: 1 inside, 0 outside (van Oosterom & Strackee 1983).
+/// Winding number of the closed parts of a mesh around a point: 1 inside, 0 outside (van Oosterom & Strackee 1983).
 pub(crate) fn winding_number(mesh: &Mesh, p: &Vector3<f64>) -> f64 {
     let solid_angle = |face| {
         let [a, b, c] = corners(mesh, face).map(|corner| corner - p);

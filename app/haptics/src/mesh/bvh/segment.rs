@@ -32,14 +32,14 @@ use crate::mesh::{Face, Sides};
 
 /// The surface from which a god-object sets out.
 pub(in crate::mesh) trait Leaving {
-    /// Whether it is in a face, not at its rim.
+    /// True within a face, not at its rim.
     fn is_face(&self) -> bool;
 
-    /// Whether a face with this normal, towards the start, behind which that lies by more than rounding but less than the
-    /// tolerance, is the far side of what is left.
+    /// True for a face with this normal, towards the start, behind which that lies by more than rounding but less than the
+    /// tolerance, if it is the far side of what is left.
     fn is_far_side(&self, normal_B: &Vector3<f64>) -> bool;
 
-    /// Whether such a face on which the start lies is upon the one that is left, back to back.
+    /// True for such a face on which the start lies, if it is upon the one that is left, back to back.
     fn lies_upon(&self, normal_B: &Vector3<f64>) -> bool;
 }
 
@@ -162,7 +162,7 @@ struct Segment<'l, L> {
     path: Vector3<f64>,
     sides: Sides,
     tolerance_m: f64,
-    /// What distances from planes are rounded by at most.
+    /// Largest rounding of a distance from a plane.
     rounded_m: f64,
     leaving: &'l L,
 }
@@ -209,7 +209,7 @@ impl<'l, L: Leaving> Segment<'l, L> {
         is_met.then_some(Met { face: index, fraction, is_front })
     }
 
-    /// Whether this is the far side of what is left: behind it by more than rounding, or upon it.
+    /// True for the far side of what is left: behind it by more than rounding, or upon it.
     #[inline(always)]
     fn leaves_back_to_back(&self, face: &Face, is_front: bool, before: f64) -> bool {
         let normal_B = if is_front { face.normal_B } else { -face.normal_B };
@@ -378,9 +378,9 @@ impl Slabs {
 
 /// How far behind a face a segment may start, relative to the mesh: a hundred times what rounding can do.
 const TOLERANCE: f64 = 1e-13;
-/// How far behind a face what is on it may be found, relative to the coordinates. The three products of a distance from a plane
-/// are rounded by 2.6 eps at most, those of the plane's own offset by as much; the normal of a well-shaped face, and the place
-/// itself, by two more. Of 320,000 random faces and places it was 2.64 eps at most.
+/// Distance behind a face at which a point on it may be found, relative to the coordinates. The three products of a distance
+/// from a plane are rounded by 2.6 eps at most, those of the plane's own offset by as much; the normal of a well-shaped face,
+/// and the place itself, by two more. Of 320,000 random faces and places it was 2.64 eps at most.
 const ROUNDED: f64 = 8.0 * f64::EPSILON;
 /// Relative to the coordinates from which the clipped ends are computed with a few roundings of 1e-16 each.
 const BOX_PAD: f64 = 1e-12;
