@@ -6,6 +6,7 @@ use crate::outcome::{RunFailure, Stop};
 use crate::outputs::{self, Output};
 use clap::Args;
 use io_driver::say::say;
+use rt_core::plain_text::beginning;
 use rt_core::{input_file, replacement};
 use std::path::{Path, PathBuf};
 use world::MAX_FILE_BYTES;
@@ -81,7 +82,7 @@ fn open(objects: &Path, name: &str, named_by: &str) -> Result<ObjectFile, RunFai
     let file = tried.iter().find(|file| file.is_file()).ok_or_else(|| {
         RunFailure::Start(format!(
             "{named_by}: no object file {}, with or without .ini or .txt; --objects says where they are",
-            tried[0].display()
+            objects.join(&*beginning(name)).display()
         ))
     })?;
     parsed(file, &read(file)?)

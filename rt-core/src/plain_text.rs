@@ -39,6 +39,35 @@ impl<T: Display> Display for PlainJson<T> {
     }
 }
 
+/// Characters of a foreign text that a message repeats.
+const MOST_QUOTED_CHARS: usize = 60;
+
+/// Beginning of a foreign text, enough to find it by, with points where it goes on: a line of a broken file can have
+/// megabytes.
+pub fn beginning(text: &str) -> Cow<'_, str> {
+    match text.char_indices().nth(MOST_QUOTED_CHARS) {
+        Some((end, _)) => format!("{}...", &text[..end]).into(),
+        None => text.into(),
+    }
+}
+
+/// The same between quotes, control characters escaped.
+pub fn quoted(text: &str) -> String {
+    format!("{:?}", beginning(text))
+}
+
+/// Names that a message lists.
+const MOST_LISTED: usize = 20;
+
+/// Foreign names with commas between them; of many the first, of a long one the beginning.
+pub fn listed<'n>(names: impl IntoIterator<Item = &'n str>) -> String {
+    let mut listed: Vec<_> = names.into_iter().take(MOST_LISTED + 1).map(beginning).collect();
+    if let Some(last) = listed.get_mut(MOST_LISTED) {
+        *last = "...".into();
+    }
+    listed.join(", ")
+}
+
 /// A text with everything escaped that a terminal would act on; borrowed where there is nothing.
 pub fn plain(text: &str) -> Cow<'_, str> {
     if text.contains(is_harmful) { Plain(text).to_string().into() } else { text.into() }
@@ -110,6 +139,23 @@ mod tests {
             assert_eq!(plain(text), text);
             assert!(matches!(plain(text), Cow::Borrowed(_)));
         }
+    }
+
+    #[test]
+    fn of_a_long_text_the_beginning_is_quoted() {
+        let (whole, long) = ["ä".repeat(60), "ä".repeat(61)].into();
+        assert_eq!(beginning(&whole), whole);
+        assert_eq!(beginning(&long), whole.clone() + "...");
+        assert_eq!(quoted(&long), format!("\"{whole}...\""));
+        assert_eq!(quoted("a\n"), "\"a\\n\"");
+    }
+
+    #[test]
+    fn of_many_names_the_first_are_listed() {
+        assert_eq!(listed([]), "");
+        assert_eq!(listed(["a", &"b".repeat(61)]), format!("a, {}...", "b".repeat(60)));
+        assert_eq!(listed(["a"; 20]), ["a"; 20].join(", "));
+        assert_eq!(listed(["a"; 21]), ["a"; 20].join(", ") + ", ...");
     }
 
     #[test]

@@ -57,11 +57,19 @@ fn parse_row(line: usize, text: &str) -> Result<Pair, PairsError> {
         *number = parse_cell(cell).ok_or_else(|| PairsError::BadCell {
             line,
             column: COLUMNS[column],
-            found: cell.chars().take(LONGEST_QUOTE).collect(),
+            found: beginning(cell),
         })?;
     }
     let [xf, yf, zf, xn, yn, zn] = numbers;
     Ok(Pair { line, fiducial: Vector3::new(xf, yf, zf), other: Vector3::new(xn, yn, zn) })
+}
+
+/// Enough of a cell to find it by.
+fn beginning(cell: &str) -> String {
+    match cell.char_indices().nth(LONGEST_QUOTE) {
+        Some((end, _)) => format!("{}...", &cell[..end]),
+        None => cell.into(),
+    }
 }
 
 fn parse_cell(cell: &str) -> Option<f64> {

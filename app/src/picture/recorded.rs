@@ -7,6 +7,7 @@ use crate::export::damaged;
 use crate::outcome::RunFailure;
 use crate::record::read::ReadError;
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
+use rt_core::plain_text::{beginning, listed};
 use rt_core::separators;
 use std::path::{Path, PathBuf};
 use thiserror::Error;
@@ -89,7 +90,7 @@ impl Recorded {
         let at = |column: &str| {
             let no_column = || RecordedError::NoColumn {
                 file: file.into(),
-                column: column.into(),
+                column: beginning(column).into(),
                 hint: separators::hint_for_header(&header.join(",")),
             };
             header.iter().position(|name| name == column).ok_or_else(no_column)
@@ -185,11 +186,10 @@ impl Recorded {
         if !chosen.is_empty() {
             return Ok(chosen);
         }
-        let known: Vec<_> = self.fingers.iter().map(|finger| finger.name.as_str()).collect();
         Err(RecordedError::NoFinger {
             file: self.file.clone(),
             name: name.unwrap_or_default().into(),
-            known: known.join(", "),
+            known: listed(self.fingers.iter().map(|finger| finger.name.as_str())),
         })
     }
 }

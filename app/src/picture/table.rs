@@ -15,6 +15,7 @@ use parquet::file::reader::{FileReader, SerializedFileReader};
 use parquet::record::Field;
 use parquet::record::reader::RowIter;
 use rt_core::input_file;
+use rt_core::plain_text::beginning;
 use std::fs::File;
 use std::io::{Read, Seek, SeekFrom};
 use std::path::{Path, PathBuf};
@@ -88,7 +89,11 @@ impl Table {
                     let Value::Text(text) = cell else { continue };
                     check_text(text).map_err(|why| {
                         let name = self.columns.get(index).map_or("", String::as_str);
-                        bad_text(&self.file, line, &format!("column {} ({name}): {why}", index + 1))
+                        bad_text(
+                            &self.file,
+                            line,
+                            &format!("column {} ({}): {why}", index + 1, beginning(name)),
+                        )
                     })?;
                 }
                 Ok(Some(TableRow { line, cells }))
@@ -122,10 +127,10 @@ impl Table {
         number.filter(|number: &f64| number.is_finite()).ok_or_else(|| RecordedError::NoNumber {
             file: self.file.clone(),
             line: row.line,
-            column: self.columns[column].clone(),
+            column: beginning(&self.columns[column]).into(),
             found: match cell {
                 Some(Value::Number(number)) => number.to_string(),
-                Some(Value::Text(text)) => text.clone(),
+                Some(Value::Text(text)) => beginning(text).into(),
                 None => String::new(),
             },
         })

@@ -19,7 +19,7 @@ use mcap_rows::McapRows;
 use rt_core::file_kind::{self, BEGIN_BYTES};
 use rt_core::input_file;
 use rt_core::limits;
-use rt_core::plain_text::is_harmful;
+use rt_core::plain_text::{is_harmful, quoted};
 use std::io::{self, Read};
 use std::path::{Path, PathBuf};
 use thiserror::Error;
@@ -186,7 +186,7 @@ impl RecordedRun {
 /// Refuses a text that a terminal would act on: names go from recordings to people and into files of ours.
 pub(crate) fn check_text(text: &str) -> Result<(), String> {
     if text.contains(is_harmful) {
-        return Err(format!("found {text:?}, allowed: no control characters"));
+        return Err(format!("found {}, allowed: no control characters", quoted(text)));
     }
     Ok(())
 }

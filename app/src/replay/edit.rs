@@ -3,6 +3,7 @@
 //! Model: a key is a way through the document, `entity.table.stiffness_n_per_m`; in a list of tables the next word is a
 //! name, the default name (`e0`, `f0`) or the place in the list. What a value may be is for the reader of scenes to say.
 
+use rt_core::plain_text::listed;
 use toml_edit::{ArrayOfTables, DocumentMut, Item, Table, TableLike, Value};
 
 /// A change.
@@ -89,9 +90,10 @@ fn choose<'t>(list: &'t mut ArrayOfTables, word: &str, member: &str) -> Result<&
     };
     let names: Vec<String> = list.iter().enumerate().map(name).collect();
     let place = names.iter().position(|name| name == member).or_else(|| member.parse().ok());
-    place
-        .and_then(|place| list.get_mut(place))
-        .ok_or_else(|| format!("no {word} {member:?} in this scene; there are: {}", names.join(", ")))
+    place.and_then(|place| list.get_mut(place)).ok_or_else(|| {
+        let known = listed(names.iter().map(String::as_str));
+        format!("no {word} {member:?} in this scene; there are: {known}")
+    })
 }
 
 #[cfg(test)]

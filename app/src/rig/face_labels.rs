@@ -2,6 +2,7 @@
 
 use super::RigError;
 use rt_core::likeness::nearest;
+use rt_core::plain_text::{beginning, listed};
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 use world::FacesSpec;
@@ -34,14 +35,14 @@ pub(super) fn labels(names: Option<&FaceNames>, faces: &[FacesSpec]) -> Result<V
     if let (Some(first), true) = (faces.first(), names.is_some_and(FaceNames::is_cut)) {
         return Err(vec![Unknown {
             table: 0,
-            found: first.of.join(", "),
+            found: listed(first.of.iter().map(String::as_str)),
             allowed: "files whose names take 64 MB at most: join its parts, or shorten their names".into(),
         }]);
     }
     let mut unknown = Vec::new();
     for (table, spec) in faces.iter().enumerate() {
         for name in spec.of.iter().filter(|name| !all.contains_key(name.as_str())) {
-            unknown.push(Unknown { table, found: name.clone(), allowed: allowed(name, &all) });
+            unknown.push(Unknown { table, found: beginning(name).into(), allowed: allowed(name, &all) });
         }
     }
     if !unknown.is_empty() {
@@ -64,13 +65,6 @@ fn allowed(name: &str, all: &BTreeMap<&str, usize>) -> String {
         return "none, since the file names no faces; OBJ, glTF, ASE and 3DS files can".into();
     }
     let meant = nearest(&name.to_lowercase(), all.keys().copied());
-    let meant = meant.map_or_else(String::new, |meant| format!(" (did you mean `{meant}`?)"));
-    let mut shown: Vec<&str> = all.keys().copied().take(MOST_SHOWN).collect();
-    if all.len() > MOST_SHOWN {
-        shown.push("...");
-    }
-    format!("the names in the file{meant}: {}", shown.join(", "))
+    let meant = meant.map_or_else(String::new, |meant| format!(" (did you mean `{}`?)", beginning(meant)));
+    format!("the names in the file{meant}: {}", listed(all.keys().copied()))
 }
-
-/// Of the names, in a message.
-const MOST_SHOWN: usize = 20;

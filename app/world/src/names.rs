@@ -7,7 +7,8 @@ use std::collections::BTreeMap;
 
 use crate::document::Document;
 use crate::error::SceneError;
-use crate::reader::{Table, Value, quoted};
+use crate::reader::{Table, Value};
+use rt_core::plain_text::quoted;
 
 /// The longest name, in characters (all are ASCII).
 pub const MAX_NAME_BYTES: usize = 64;

@@ -9,6 +9,7 @@ use std::ops::RangeInclusive;
 use std::path::{Path, PathBuf};
 use std::rc::Rc;
 
+use rt_core::plain_text::{beginning, quoted};
 use rt_core::toml_slips;
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
@@ -325,11 +326,14 @@ impl<'d> Value<'d> {
         }
     }
 
-    /// The name of a file. A line break or an escape in it would spoil every message that names the file.
+    /// The name of a file. A line break or an escape in it, or a megabyte, would spoil every message that names the file.
     pub(crate) fn path(&self, allowed: &str) -> Result<&'d str, SceneError> {
         let path = self.text(allowed)?;
         if path.contains(char::is_control) {
             return Err(self.out_of_range(format_args!("{allowed}, without control characters")));
+        }
+        if path.len() > MOST_PATH_BYTES {
+            return Err(self.out_of_range(format_args!("{allowed}, of at most {MOST_PATH_BYTES} bytes")));
         }
         Ok(path)
     }
@@ -343,7 +347,7 @@ impl<'d> Value<'d> {
     pub(crate) fn choose(&self, what: &'static str, words: &Vocabulary) -> Result<&'static str, SceneError> {
         let available = words.list();
         let word = self.text(&available)?;
-        let found = || shortened(word).escape_debug().to_string();
+        let found = || beginning(word).escape_debug().to_string();
         match words.judge(word) {
             Verdict::Available(word) => Ok(word),
             Verdict::Later => {
@@ -422,8 +426,8 @@ impl<'d> Value<'d> {
     fn found(&self) -> String {
         match self.value.get_ref() {
             DeValue::String(text) => format!("the string {}", quoted(text)),
-            DeValue::Integer(integer) => shortened(&integer.to_string()),
-            DeValue::Float(float) => shortened(float.as_str()),
+            DeValue::Integer(integer) => beginning(&integer.to_string()).into_owned(),
+            DeValue::Float(float) => beginning(float.as_str()).into_owned(),
             DeValue::Boolean(truth) => format!("the boolean {truth}"),
             DeValue::Datetime(date) => format!("the date {date}"),
             DeValue::Array(items) => format!("an array of length {}", items.len()),
@@ -468,21 +472,9 @@ impl fmt::Display for Bound {
     }
 }
 
-/// A string as it would be written in the file, control characters escaped, cut if it is long.
-pub(crate) fn quoted(text: &str) -> String {
-    format!("{:?}", shortened(text))
-}
-
-fn shortened(text: &str) -> String {
-    match text.char_indices().nth(LONGEST_SHOWN_CHARS) {
-        Some((end, _)) => format!("{}...", &text[..end]),
-        None => text.into(),
-    }
-}
-
 fn shown_key(key: &str) -> String {
     let is_bare = |c: char| c.is_ascii_alphanumeric() || c == '_' || c == '-';
-    if !key.is_empty() && key.chars().all(is_bare) { shortened(key) } else { quoted(key) }
+    if !key.is_empty() && key.chars().all(is_bare) { beginning(key).into_owned() } else { quoted(key) }
 }
 
 /// Keys of which a table can have one only: the upper table's hides the other beneath.
@@ -499,6 +491,6 @@ const OF_MOVING: [&str; 7] = [
 ];
 /// Keys that say what a table is, so that what lies beneath it is of no use to it.
 const OF_ITS_OWN: [&str; 2] = ["kind", "model"];
+/// What the kernel takes, without its end.
+const MOST_PATH_BYTES: usize = 4095;
 const WIDE_INTEGER: &str = "an integer of at most 64 bits, or a number with a point or an exponent";
-/// A message stays one readable line, whatever the file holds.
-const LONGEST_SHOWN_CHARS: usize = 60;

@@ -18,8 +18,9 @@ use std::collections::BTreeMap;
 use crate::error::SceneError;
 use crate::names::Names;
 use crate::problems::Problems;
-use crate::reader::{Table, quoted};
+use crate::reader::Table;
 use rt_core::likeness::nearest;
+use rt_core::plain_text::{self, quoted};
 
 /// How many templates may build on each other.
 pub const MAX_TEMPLATE_DEPTH: usize = 8;
@@ -97,13 +98,6 @@ impl<'d> Templates<'d> {
 
 /// Some of the names that there are.
 pub(crate) fn listed<'n>(names: impl Iterator<Item = &'n str>) -> String {
-    const MOST: usize = 20;
-    let mut names: Vec<&str> = names.take(MOST + 1).collect();
-    if names.is_empty() {
-        return "none, since there is none".into();
-    }
-    if names.len() > MOST {
-        names[MOST] = "...";
-    }
-    names.join(", ")
+    let names = plain_text::listed(names);
+    if names.is_empty() { "none, since there is none".into() } else { names }
 }

@@ -12,8 +12,9 @@ use crate::grid::MAX_ENTITIES;
 use crate::light::SceneLight;
 use crate::names::Names;
 use crate::problems::Problems;
-use crate::reader::{Table, quoted};
+use crate::reader::Table;
 use crate::templates::{SceneTemplate, Templates, listed};
+use rt_core::plain_text::quoted;
 
 /// All of it, as far as it could be read.
 #[derive(Debug, Default)]

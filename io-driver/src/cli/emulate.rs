@@ -18,6 +18,7 @@ use crate::table::MAX_TABLE_BYTES;
 use clap::Args;
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 use rt_core::input_file;
+use rt_core::plain_text::listed;
 use rt_core::signals::StopSignals;
 use std::error::Error;
 use std::path::{Path, PathBuf};
@@ -190,9 +191,7 @@ fn script(file: &Path, finger: &str) -> Result<(HandScript, usize), Box<dyn Erro
         // What is wrong with the file comes before a finger that is not in it.
         None => Err(match HandScript::parse(&text, file, &named) {
             Err(error) if !named.is_empty() => error.into(),
-            _ => {
-                format!("{}: no finger {finger}; --finger one of {}", file.display(), named.join(", ")).into()
-            }
+            _ => format!("{}: no finger {finger}; --finger one of {}", file.display(), listed(named)).into(),
         }),
     }
 }

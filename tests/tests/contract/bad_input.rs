@@ -452,6 +452,58 @@ fn with_recordings(place: &Workplace) {
     }
 }
 
+/// A broken file can be one line of megabytes.
+#[test]
+fn of_what_a_file_holds_no_message_repeats_more_than_a_beginning() {
+    let place = workplace();
+    with_recordings(&place);
+    let long = "x".repeat(100_000);
+    let table = std::fs::read_to_string(place.path("good.csv")).expect("a table");
+    let (header, rows) = table.split_once('\n').expect("a header");
+    let bad = [
+        format!("t,\"{long}_hip_x\n0,1\n"),
+        format!("t,{long}_hip_x\n0,1\n"),
+        format!("t,\u{1b}{long}_hip_x\n0,1\n"),
+        format!("{header},{long}\n{rows}"),
+        format!("{header}\n{}", rows.replacen("0.0", &long, 2)),
+    ];
+    for (number, text) in bad.iter().enumerate() {
+        place.write("bad.csv", text);
+        for command in ["export bad.csv new.csv", "replay bad.csv", "plot bad.csv --svg-only --out new"] {
+            let arguments: Vec<_> = command.split(' ').collect();
+            // One draws the columns that it knows, the other wants a scene first.
+            if matches!((number, arguments[0]), (3, "plot") | (4, "replay")) {
+                continue;
+            }
+            assert_is_short(&refused(&place, &arguments), &format!("{command} of {number}"));
+        }
+    }
+    place.write("bad.csv", table.replace("f0_", &format!("{long}_")));
+    let plot = ["plot", "bad.csv", "--finger", "none", "--svg-only", "--out", "new"];
+    assert_is_short(&refused(&place, &plot), "plot --finger");
+    place.write("pairs.csv", format!("0 0 0 0 0 {long}\n"));
+    place.write("objects.ini", format!("GameObject {long}\n"));
+    for (command, words) in
+        [("calibrate --pairs pairs.csv", "pairs.csv"), ("convert objects.ini", "objects.ini")]
+    {
+        let said = place.run(command.split(' '));
+        assert_eq!(said.status, Some(2), "{command}: {}", said.err);
+        assert_says(&said.err, &[words]);
+        assert_is_short(&said.err, command);
+    }
+    let mesh = format!("[[entity]]\nshape = {{ kind = \"mesh\", file = \"{long}.obj\" }}\n");
+    for scene in
+        [format!("hand = \"{long}\"\n{SCENE}"), format!("include = [\"{long}\"]\n"), SCENE.to_owned() + &mesh]
+    {
+        place.write("bad.toml", scene);
+        assert_is_short(&refused(&place, &["run", "bad.toml"]), "run");
+    }
+}
+
+fn assert_is_short(message: &str, asked: &str) {
+    assert!(message.contains("xxx...") && message.len() < 600, "{asked}: {} bytes", message.len());
+}
+
 /// With room for so many megabytes of addresses.
 pub(crate) fn run_in_little_memory(place: &Workplace, megabytes: u32, arguments: &[&str]) -> Said {
     let mut program = place.prepare(std::process::Command::new("sh"));

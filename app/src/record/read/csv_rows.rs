@@ -11,6 +11,7 @@ use crate::row::{BodyRow, FingerRow, Row};
 use io_driver::device::{Extras, run_time_s};
 use nalgebra::{Quaternion, Vector3};
 use physics::GraspQuality;
+use rt_core::plain_text::{beginning, quoted};
 use rt_core::{input_file, separators};
 use shm_abi::MAX_DEVICES;
 use std::collections::{HashMap, VecDeque};
@@ -180,12 +181,12 @@ impl Cells<'_> {
     fn number(&mut self) -> Result<f64, String> {
         let (cell, column) = self.take();
         let number = cell.parse().ok().filter(|number: &f64| number.is_finite());
-        number.ok_or_else(|| format!("{} is {cell:?}, allowed: a number", column.name))
+        number.ok_or_else(|| no_number(cell, column, "a number"))
     }
 
     fn whole(&mut self) -> Result<u64, String> {
         let (cell, column) = self.take();
-        cell.parse().map_err(|_| format!("{} is {cell:?}, allowed: a whole number", column.name))
+        cell.parse().map_err(|_| no_number(cell, column, "a whole number"))
     }
 
     fn numbers<const N: usize>(&mut self) -> Result<[f64; N], String> {
@@ -203,7 +204,7 @@ impl Cells<'_> {
     fn name(&mut self) -> Result<String, String> {
         let at = self.at;
         let (cell, column) = self.take();
-        check_text(cell).map_err(|why| format!("column {} ({}): {why}", at + 1, column.name))?;
+        check_text(cell).map_err(|why| format!("column {} ({}): {why}", at + 1, beginning(&column.name)))?;
         Ok(cell.to_owned())
     }
 
@@ -238,7 +239,9 @@ impl Cells<'_> {
 
     fn word<T>(&mut self, named: fn(&str) -> Option<T>) -> Result<T, String> {
         let (cell, column) = self.take();
-        named(cell).ok_or_else(|| format!("{} is {cell:?}, which is no word for it", column.name))
+        named(cell).ok_or_else(|| {
+            format!("{} is {}, which is no word for it", beginning(&column.name), quoted(cell))
+        })
     }
 
     fn finger(&mut self, index: usize, shape: &Shape<'_>) -> Result<FingerRow, String> {
@@ -292,6 +295,10 @@ impl Cells<'_> {
     }
 }
 
+fn no_number(cell: &str, column: &Column, allowed: &str) -> String {
+    format!("{} is {}, allowed: {allowed}", beginning(&column.name), quoted(cell))
+}
+
 fn check_count(known: usize, most: usize, what: &str) -> Result<(), String> {
     if known < most { Ok(()) } else { Err(format!("more than {most} {what} are named; allowed: as many")) }
 }
@@ -300,9 +307,9 @@ fn check_count(known: usize, most: usize, what: &str) -> Result<(), String> {
 fn check_header(header: &str, names: &Names, expected: &[Column]) -> Result<(), String> {
     let hint = separators::hint_for_header(header);
     if names.fingers.is_empty() {
-        let begin: String = header.chars().take(SHOWN_CHARS).collect();
         return Err(format!(
-            "its first line is {begin:?}, without a column such as f0_hip_x of a finger{hint}"
+            "its first line is {}, without a column such as f0_hip_x of a finger{hint}",
+            quoted(header)
         ));
     }
     for (index, name) in header.split(',').enumerate() {
@@ -314,30 +321,29 @@ fn check_header(header: &str, names: &Names, expected: &[Column]) -> Result<(), 
             Some(name) if name == column.name => {}
             Some(name) => {
                 return Err(format!(
-                    "its column {} is {name:?}, expected {:?}{hint}",
+                    "its column {} is {}, expected {}{hint}",
                     index + 1,
-                    column.name
+                    quoted(name),
+                    quoted(&column.name)
                 ));
             }
             None => {
                 return Err(format!(
-                    "its first line ends behind {index} columns, expected {:?}{hint}",
-                    column.name
+                    "its first line ends behind {index} columns, expected {}{hint}",
+                    quoted(&column.name)
                 ));
             }
         }
     }
     found.next().map_or(Ok(()), |name| {
         Err(format!(
-            "its column {} is {name:?}, expected no more than {}",
+            "its column {} is {}, expected no more than {}",
             expected.len() + 1,
+            quoted(name),
             expected.len()
         ))
     })
 }
-
-/// Enough of a line to know it again.
-const SHOWN_CHARS: usize = 40;
 
 /// Which names a header is made of, as far as it is one.
 fn names_in(header: &str) -> Names {

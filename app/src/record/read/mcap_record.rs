@@ -7,6 +7,7 @@
 //! needs are taken. Reference: the MCAP specification, "Records".
 //! Cost: nothing is copied but metadata.
 
+use rt_core::plain_text::beginning;
 use std::collections::BTreeMap;
 use thiserror::Error;
 
@@ -58,7 +59,7 @@ pub(super) enum RecordError {
     Short,
     #[error("a text in a record is not UTF-8")]
     NoText,
-    #[error("the attached file {name} does not have its check sum")]
+    #[error("the attached file {} does not have its check sum", beginning(.name))]
     CheckSum { name: String },
 }
 

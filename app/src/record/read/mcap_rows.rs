@@ -14,6 +14,7 @@ use crate::row::{BodyRow, Row};
 use mcap::McapError;
 use mcap::sans_io::linear_reader::{LinearReadEvent, LinearReader, LinearReaderOptions};
 use rt_core::input_file;
+use rt_core::plain_text::beginning;
 use std::fs::File;
 use std::io::{self, Read};
 use std::path::{Path, PathBuf};
@@ -258,8 +259,9 @@ impl McapRows {
 
     fn compressed_by(&self, other: &str) -> ReadError {
         let why = format!(
-            "its chunks are compressed by {other}; allowed: lz4, or none: rewrite it with `mcap compress --compression lz4 \
-             IN.mcap -o OUT.mcap`"
+            "its chunks are compressed by {}; allowed: lz4, or none: rewrite it with `mcap compress --compression lz4 \
+             IN.mcap -o OUT.mcap`",
+            beginning(other)
         );
         ReadError::Unsupported { file: self.path.clone(), why }
     }

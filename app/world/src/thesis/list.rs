@@ -1,7 +1,7 @@
 //! The scene list, `objects.ini` (Melder figure 7.2).
 
 use super::ThesisError;
-use crate::reader::quoted;
+use rt_core::plain_text::quoted;
 use std::path::Path;
 
 /// A line of the list.

@@ -2,8 +2,8 @@
 
 use super::ThesisError;
 use super::list::without_comment;
-use crate::reader::quoted;
 use nalgebra::{Matrix3, UnitQuaternion};
+use rt_core::plain_text::quoted;
 use std::cell::Cell;
 use std::path::{Path, PathBuf};
 

@@ -2,6 +2,7 @@
 
 use super::HandError;
 use crate::table::{Cells, TableReader};
+use rt_core::plain_text::listed;
 
 /// Indices of a finger's columns.
 #[derive(Debug, Clone, Copy)]
@@ -16,7 +17,8 @@ const QUATERNION: [&str; 4] = ["_qw", "_qx", "_qy", "_qz"];
 const BUTTONS: &str = "_buttons";
 
 pub(super) fn refuse_unknown(reader: &TableReader<'_>, fingers: &[&str]) -> Result<(), HandError> {
-    let known = || if fingers.is_empty() { "no finger at all".to_owned() } else { fingers.join(", ") };
+    let known =
+        || if fingers.is_empty() { "no finger at all".to_owned() } else { listed(fingers.iter().copied()) };
     let belongs = |column: &str| {
         let mut suffixes = AXES.iter().chain(&QUATERNION).chain([&BUTTONS]);
         suffixes.any(|suffix| column.strip_suffix(suffix).is_some_and(|finger| fingers.contains(&finger)))
