@@ -111,7 +111,7 @@ fn is_frame_in(directory: &Path, file: &Path) -> bool {
         number.is_some_and(|number| number.len() >= 6 && number.bytes().all(|byte| byte.is_ascii_digit()))
     };
     place.file_name().and_then(OsStr::to_str).is_some_and(is_frame)
-        && place.parent() == Some(&place_of(directory))
+        && place.parent().is_some_and(|parent| is_same_place(parent, &place_of(directory)))
 }
 
 /// Refuses outputs that would overwrite an input or one another, or whose names say no format; the standard output, where

@@ -186,9 +186,17 @@ pub fn is_same_file(a: &Path, b: &Path) -> bool {
 pub fn is_same_place(a: &Path, b: &Path) -> bool {
     match [a, b].map(is_standard_output) {
         [true, true] => true,
-        [false, false] => place_of(a) == place_of(b) || is_same_file(a, b),
+        [false, false] => is_same_file(a, b) || is_one_name(&place_of(a), &place_of(b)),
         _ => false,
     }
+}
+
+/// Whether both are one name in one directory, which has two itself where it is mounted twice. Of what is there already
+/// the file tells.
+fn is_one_name(a: &Path, b: &Path) -> bool {
+    let is_free = || !a.exists() && !b.exists();
+    let is_one_directory = || matches!((a.parent(), b.parent()), (Some(a), Some(b)) if is_same_file(a, b));
+    a == b || a.file_name() == b.file_name() && is_free() && is_one_directory()
 }
 
 /// Place at which a file of this name is, or would be made: at the end of all links, also of one that leads to nothing yet.

@@ -14,17 +14,33 @@ pub fn limited(command: &Command, limits: &str) -> Command {
 /// `size=100k`, which nobody else sees; `None` if no disk can be mounted here, not even in a namespace.
 pub fn on_small_disk(command: &Command, directory: &Path, options: &str) -> Option<Command> {
     let mount = format!("mount -t tmpfs -o {options} tmpfs '{}'", directory.display());
+    let mounted = mounted(command, &mount);
+    if mounted.is_none() {
+        eprintln!("skipped: no small disk can be mounted here; limited files cover the same path");
+    }
+    mounted
+}
+
+/// `command` where `directory` has a second name, which nobody else sees; `None` if nothing can be mounted here, not even
+/// in a namespace.
+pub fn mounted_twice(command: &Command, directory: &Path, name: &Path) -> Option<Command> {
+    let mounted = mounted(command, &format!("mount --bind '{}' '{}'", directory.display(), name.display()));
+    if mounted.is_none() {
+        eprintln!("skipped: nothing can be mounted here; links give files two names elsewhere");
+    }
+    mounted
+}
+
+/// `command` after this command line, whose mounts nobody else sees.
+fn mounted(command: &Command, mount: &str) -> Option<Command> {
     let rights = [&["--mount"][..], &["--user", "--map-root-user", "--mount"]];
     let is_possible = |rights: &&&[&str]| {
         let mut unshare = Command::new("unshare");
-        unshare.args(**rights).args(["sh", "-c", &mount]);
+        unshare.args(**rights).args(["sh", "-c", mount]);
         unshare.stderr(Stdio::null()).bounded_status().is_ok_and(|status| status.success())
     };
-    let Some(rights) = rights.iter().find(is_possible) else {
-        eprintln!("skipped: no small disk can be mounted here; limited files cover the same path");
-        return None;
-    };
-    eprintln!("a small disk by unshare {}", rights.join(" "));
+    let rights = rights.iter().find(is_possible)?;
+    eprintln!("mounted by unshare {}", rights.join(" "));
     let script = format!("{mount} && exec \"$0\" \"$@\"");
     Some(wrapped("unshare", &[rights, &["sh", "-c", &script][..]].concat(), command))
 }

@@ -2,6 +2,7 @@
 
 use super::{BALL, PRECIOUS, SCENE, assert_says, refused, with_recordings, workplace};
 use std::fs;
+use system_tests::faults::scarcity::mounted_twice;
 use system_tests::workplace::{Running, Workplace};
 
 /// A recording and its table, of more than a megabyte.
@@ -312,5 +313,33 @@ fn the_recording_of_a_later_scene_that_cannot_be_made_is_the_one_that_is_told() 
         let line = said.out.lines().find(|line| line.contains(&format!(" {name} (")));
         let line = line.unwrap_or_else(|| panic!("{name}: {}", said.out));
         assert!(!line.contains("NOT") && !line.contains("(0 rows)"), "{line}");
+    }
+}
+
+/// A directory that is mounted twice gives each of its files two names, also those that are still to be made.
+#[test]
+fn outputs_that_are_one_file_over_two_mounts_are_told_so() {
+    let place = workplace();
+    for name in ["one", "two"] {
+        fs::create_dir(place.path(name)).expect("room");
+    }
+    let run = ["run", "scene.toml", "--clock", "virtual", "--seconds", "0.1"];
+    let cases: [(&[&str], &str); 3] = [
+        (&["--record", "one/o.csv", "--record", "two/o.csv"], "--record two/o.csv is given twice"),
+        (
+            &["--record", "one/o.csv", "--events", "two/o.csv"],
+            "--record one/o.csv and --events two/o.csv would both",
+        ),
+        (&["--frames", "one", "--snapshot", "0.05:two/frame-000001.png"], "would both write to"),
+    ];
+    for (outputs, words) in cases {
+        let mut program = place.phantom3();
+        program.args(run).args(outputs);
+        let Some(program) = mounted_twice(&program, &place.path("one"), &place.path("two")) else { return };
+        let before = place.snapshot();
+        let said = Running::start(program).wait();
+        assert_eq!(said.status, Some(2), "{outputs:?}: {}", said.err);
+        assert_says(&said.err, &[words, "each needs a file of its own"]);
+        assert!(place.snapshot() == before, "{outputs:?}: {}", said.err);
     }
 }
