@@ -76,8 +76,8 @@ fn load() -> String {
 }
 
 fn slice(rig: &Rig, with_view: bool) -> Result<Slice, String> {
-    let mut child =
-        DriverChild::start(&rig.driver_config(ClockMode::Real)).map_err(|error| error.to_string())?;
+    let mut child = DriverChild::start(rig.driver_config(ClockMode::Real), rig.hand.as_ref())
+        .map_err(|error| error.to_string())?;
     let attachment = child.attach("with_view").map_err(|error| error.to_string())?;
     let baseline = io_driver::meter::read(&attachment.driver.round_trip_ns);
     let step = rig.fast_step().expect("rendering");

@@ -1,11 +1,12 @@
 //! The driver as this program's own child process.
 //!
 //! Model: this very program is started again as `phantom3 driver run`, its configuration goes in through
-//! standard input, and its socket lies in a directory that only this user can enter. The child ends with
-//! its parent, however that ends.
+//! standard input, and its socket lies in a directory that only this user can enter, beside a copy of the hand file as it
+//! was read and checked here. The child ends with its parent, however that ends.
 
 use crate::outcome::RunFailure;
-use io_driver::config::DriverConfig;
+use crate::rig::HandFile;
+use io_driver::config::{DriverConfig, HandSource};
 use rt_core::limits;
 use rustix::process::{Pid, Signal, kill_process};
 use shm_abi::client::{self, AttachError, Attachment};
@@ -31,18 +32,24 @@ pub struct DriverChild {
 }
 
 impl DriverChild {
-    /// Starts a driver.
+    /// Starts a driver, whose devices follow this hand as far as the configuration names it.
     ///
     /// Call it from the main thread: the child ends with the *thread* that started it.
     ///
     /// # Errors
     /// If the process cannot be started.
-    pub fn start(config: &DriverConfig) -> Result<Self, RunFailure> {
+    pub fn start(mut config: DriverConfig, hand: Option<&HandFile>) -> Result<Self, RunFailure> {
         let failed = |what: &str, error: std::io::Error| {
             RunFailure::Start(format!("cannot {what}: {}", limits::with_remedy(&error)))
         };
         let directory =
             private_directory().map_err(|error| failed("make a directory for the driver's socket", error))?;
+        if let Some(hand) = hand {
+            let copy = directory.path().join("hand.csv");
+            std::fs::write(&copy, &hand.bytes)
+                .map_err(|error| failed("copy the hand for the driver", error))?;
+            follow(&mut config, &hand.path, &copy);
+        }
         let socket = directory.path().join("driver.sock");
         let program = std::env::current_exe().map_err(|error| failed("find this program", error))?;
         let mut child = Command::new(&program)
@@ -104,6 +111,17 @@ impl DriverChild {
     /// How it ended, if it has, within a short while.
     pub fn end(&mut self) -> Option<ExitStatus> {
         wait_at_most(&mut self.child, Duration::from_millis(500))
+    }
+}
+
+/// Has the devices that follow a hand file follow its copy.
+fn follow(config: &mut DriverConfig, hand: &Path, copy: &Path) {
+    for wish in config.devices.iter_mut().filter_map(|device| device.backend.wish_mut()) {
+        if let HandSource::Script { file, .. } = &mut wish.hand
+            && file == hand
+        {
+            *file = copy.into();
+        }
     }
 }
 

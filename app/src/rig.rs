@@ -34,7 +34,7 @@ use haptics::mesh::MeshReport;
 use haptics::passivity::Passivity;
 use haptics::{Door, Entity, Finger, Friction, ParameterError};
 use io_driver::device::Extras;
-use io_driver::open::open_devices;
+use io_driver::open::{HandFiles, open_devices_with};
 use nalgebra::{Isometry3, Vector3};
 use physics::{Aabb, Body, BroadPhase};
 use shm_abi::segment::ClockMode;
@@ -82,10 +82,12 @@ pub enum HandMode {
 /// A checked hand file.
 #[derive(Debug, Clone)]
 pub struct HandFile {
-    /// Where it lies; absolute, since the driver reads it too.
+    /// Where it lies; absolute, since the driver is told of it, too.
     pub path: PathBuf,
-    /// Its content.
+    /// Its content, which the run goes by whatever becomes of the file.
     pub bytes: Arc<[u8]>,
+    /// The same as text.
+    pub text: Arc<str>,
     /// Its duration (s).
     pub duration_s: f64,
     /// Number of its rows.
@@ -150,9 +152,14 @@ impl Rig {
             // was asked for: the driver knows of files only.
             problems.keep(simulated.arm());
             problems.keep(simulated.hand());
-            problems.keep(open_devices(&rig.driver_config(ClockMode::Virtual)));
+            problems.keep(open_devices_with(&rig.driver_config(ClockMode::Virtual), rig.hand_files()));
         }
         hand.and(step).map(|_| rig)
+    }
+
+    /// The hand file as it was read, for the driver's devices.
+    pub fn hand_files(&self) -> HandFiles {
+        self.hand.iter().map(|hand| (hand.path.clone(), Arc::clone(&hand.text))).collect()
     }
 
     /// The same at another tick length (ns): the running driver's.

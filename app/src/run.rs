@@ -27,6 +27,7 @@ use crate::two_processes::{self, Source};
 use crate::virtual_clock::VirtualDriver;
 use io_driver::device::Extras;
 use io_driver::log_thread;
+use io_driver::open::open_devices_with;
 use io_driver::say::say;
 use physics::Reason;
 use rt_core::signals::StopSignals;
@@ -231,7 +232,9 @@ fn open_window(
 }
 
 fn run_virtual(rig: &Rig, plan: &RunPlan, signals: &StopSignals) -> Result<(Report, Stop), RunFailure> {
-    let mut driver = VirtualDriver::open(&rig.driver_config(ClockMode::Virtual))?;
+    let config = rig.driver_config(ClockMode::Virtual);
+    let devices = open_devices_with(&config, rig.hand_files())?;
+    let mut driver = VirtualDriver::with_devices(&config, devices)?;
     let about = About::of_run(rig, ClockMode::Virtual, rig.period_ns, plan.seed);
     let Parts { mut fast, mut slow, mut progress, .. } =
         Parts::new(rig, plan, ClockMode::Virtual, rig.period_ns, &driver.extras(), &about, None)?;
@@ -377,7 +380,7 @@ fn connect(
             refuse_unwritable_name(rig)?;
             let mut config = rig.driver_config(plan.clock.unwrap_or(ClockMode::Real));
             live.into_iter().for_each(|live| live.lead(&mut config));
-            let mut child = DriverChild::start(&config)?;
+            let mut child = DriverChild::start(config, rig.hand.as_ref())?;
             let attachment = child.attach("phantom3")?;
             Ok((Source::Child(child), attachment))
         }

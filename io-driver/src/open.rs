@@ -21,6 +21,7 @@ use crate::table::MAX_TABLE_BYTES;
 use crate::toml_report::{MAX_TOML_BYTES, TomlReport};
 use rt_core::input_file;
 use shm_abi::segment::{ClockMode, DeviceInfo};
+use std::collections::BTreeMap;
 use std::io;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -196,26 +197,60 @@ pub enum OpenError {
     },
 }
 
+/// Texts of hand files that were read, by the names of the files: whoever follows such a file follows what was read, also
+/// if somebody changes it meanwhile.
+#[derive(Debug, Clone, Default)]
+pub struct HandFiles(BTreeMap<PathBuf, Arc<str>>);
+
+impl FromIterator<(PathBuf, Arc<str>)> for HandFiles {
+    fn from_iter<I: IntoIterator<Item = (PathBuf, Arc<str>)>>(files: I) -> Self {
+        Self(files.into_iter().collect())
+    }
+}
+
+impl HandFiles {
+    fn text(&mut self, device: &DeviceConfig, file: &Path) -> Result<Arc<str>, OpenError> {
+        if let Some(text) = self.0.get(file) {
+            return Ok(Arc::clone(text));
+        }
+        let text: Arc<str> = read(device, file, MAX_TABLE_BYTES)?.into();
+        self.0.insert(file.into(), Arc::clone(&text));
+        Ok(text)
+    }
+}
+
 /// Opens all devices of a configuration.
 ///
 /// # Errors
 /// The first that cannot be had, and why.
 pub fn open_devices(config: &DriverConfig) -> Result<Vec<Box<dyn Device>>, OpenError> {
+    open_devices_with(config, HandFiles::default())
+}
+
+/// The same, where some hand files were read already.
+///
+/// # Errors
+/// As [`open_devices`].
+pub fn open_devices_with(
+    config: &DriverConfig,
+    mut hands: HandFiles,
+) -> Result<Vec<Box<dyn Device>>, OpenError> {
     let board = Arc::new(TipBoard::default());
-    config.devices.iter().map(|device| open(device, config, &board)).collect()
+    config.devices.iter().map(|device| open(device, config, &board, &mut hands)).collect()
 }
 
 fn open(
     device: &DeviceConfig,
     config: &DriverConfig,
     board: &Arc<TipBoard>,
+    hands: &mut HandFiles,
 ) -> Result<Box<dyn Device>, OpenError> {
     if device.backend.has_registers() && config.clock != ClockMode::Real {
         return Err(OpenError::NotInRealTime { device: device.name.clone(), clock: config.clock.name() });
     }
     match &device.backend {
         Backend::Ideal(wish) => {
-            let hand = match (live_finger(device, wish)?, script(device, wish, config)?) {
+            let hand = match (live_finger(device, wish)?, script(device, wish, config, hands)?) {
                 (Some(live), _) => Hand::Live(live),
                 (None, Some((player, finger))) => Hand::Scripted(player, finger),
                 (None, None) => Hand::Resting(wish.start_m),
@@ -223,7 +258,7 @@ fn open(
             let info = commissioned(ideal_info(device), config);
             Ok(Box::new(IdealDevice::new(info, wish.base_in_world, hand)))
         }
-        Backend::Simulated { .. } => simulated::open(device, config, board),
+        Backend::Simulated { .. } => simulated::open(device, config, board, hands),
         Backend::Replay { description, trace, .. } => {
             let arm_file = mechanism(device, description)?;
             let trace = EncoderTrace::parse(
@@ -298,6 +333,7 @@ fn script(
     device: &DeviceConfig,
     wish: &Wish,
     config: &DriverConfig,
+    hands: &mut HandFiles,
 ) -> Result<Option<(HandPlayer, usize)>, OpenError> {
     let HandSource::Script { file, finger } = &wish.hand else { return Ok(None) };
     let wishes = config.devices.iter().filter_map(|other| match &other.backend.wish()?.hand {
@@ -305,7 +341,7 @@ fn script(
         _ => None,
     });
     let fingers: Vec<&str> = wishes.collect();
-    let script = HandScript::parse(&read(device, file, MAX_TABLE_BYTES)?, file, &fingers)?;
+    let script = HandScript::parse(&hands.text(device, file)?, file, &fingers)?;
     let index = fingers.iter().position(|name| name == finger).unwrap_or(0);
     if has_switch(device, config) && !script.has_buttons(index) {
         let (device, finger) = (device.name.clone(), finger.clone());

@@ -199,7 +199,7 @@ pub(super) fn check_hand(path: &Path, named_by: &str, scene: &Scene) -> Result<H
         return Err(RigError::NotAFile { file: path.into(), named_by: named_by.into() });
     }
     let bytes: Arc<[u8]> = input_file::read(path, MAX_TABLE_BYTES).map_err(unreadable)?.into();
-    let text = input_file::text(bytes.to_vec()).map_err(unreadable)?;
+    let text: Arc<str> = input_file::text(bytes.to_vec()).map_err(unreadable)?.into();
     let fingers: Vec<&str> = scene.fingers.iter().map(|finger| finger.name.as_str()).collect();
     let script = HandScript::parse(&text, path, &fingers)?;
     if script.duration_s() > LONGEST_RUN_S {
@@ -207,5 +207,5 @@ pub(super) fn check_hand(path: &Path, named_by: &str, scene: &Scene) -> Result<H
     }
     let path = std::path::absolute(path).map_err(unreadable)?;
     let bounds = (0..fingers.len()).map(|finger| script.bounds(finger)).collect();
-    Ok(HandFile { path, bytes, duration_s: script.duration_s(), rows: script.rows(), bounds })
+    Ok(HandFile { path, bytes, text, duration_s: script.duration_s(), rows: script.rows(), bounds })
 }

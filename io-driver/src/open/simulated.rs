@@ -3,7 +3,8 @@
 #![allow(non_snake_case)] // Frames are capital letters: a point p_W is in the world.
 
 use super::{
-    OpenError, arm_info, commissioned, has_switch, holds_its_weight, live_finger, mechanism, read, script,
+    HandFiles, OpenError, arm_info, commissioned, has_switch, holds_its_weight, live_finger, mechanism, read,
+    script,
 };
 use crate::config::{Backend, DeviceConfig, DriverConfig, HandChoice, ReplyMode, Wish, Zeroing};
 use crate::device::Device;
@@ -28,6 +29,7 @@ pub(super) fn open(
     device: &DeviceConfig,
     config: &DriverConfig,
     board: &Arc<TipBoard>,
+    hands: &mut HandFiles,
 ) -> Result<Box<dyn Device>, OpenError> {
     let Backend::Simulated { description, wish, holder, seed } = &device.backend else {
         unreachable!("the caller has looked");
@@ -35,7 +37,7 @@ pub(super) fn open(
     let file = mechanism(device, description)?;
     let place = config.devices.iter().position(|other| other.name == device.name).unwrap_or(0);
     let [of_plant, of_hand] = seeds(*seed, place);
-    let wanted = match (live_finger(device, wish)?, script(device, wish, config)?) {
+    let wanted = match (live_finger(device, wish)?, script(device, wish, config, hands)?) {
         (Some(live), _) => HandWish::Live(live),
         (None, Some((player, finger))) => HandWish::Scripted(player, finger),
         (None, None) => HandWish::Resting(wish.start_m),

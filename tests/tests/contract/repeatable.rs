@@ -1,9 +1,12 @@
 //! The same input gives the same recording: twice, on every clock, and tomorrow.
 
 use nalgebra::Vector3;
+use rustix::fs::inotify::{self, CreateFlags, ReadFlags, WatchFlags};
 use std::collections::HashMap;
 use std::fmt::Write as _;
+use std::mem::MaybeUninit;
 use std::path::Path;
+use system_tests::driver::Driver;
 use system_tests::recording::{Sample, Table};
 use system_tests::workplace::{Said, Workplace};
 
@@ -148,4 +151,40 @@ fn default_scene_is_felt_as_it_was_when_it_was_last_blessed() {
     }
     let blessed = std::fs::read_to_string(&file).expect("the golden file");
     assert_eq!(found, blessed, "the default scene feels different; bless it if that is meant (see the test)");
+}
+
+/// Times that a file is opened while something is done.
+fn openings(file: &Path, during: impl FnOnce()) -> usize {
+    let watch = inotify::init(CreateFlags::NONBLOCK).expect("a watch");
+    // Equal events in a row are told as one.
+    inotify::add_watch(&watch, file, WatchFlags::OPEN | WatchFlags::CLOSE_NOWRITE).expect("a file");
+    during();
+    let mut room = [MaybeUninit::uninit(); 4096];
+    let mut events = inotify::Reader::new(watch, &mut room);
+    std::iter::from_fn(|| events.next().ok().map(|event| event.events()))
+        .filter(|event| event.contains(ReadFlags::OPEN))
+        .count()
+}
+
+/// What was checked and recorded is what is played, whoever changes the file meanwhile.
+#[test]
+fn a_hand_file_is_read_once_whatever_clock_and_however_many_devices_follow_it() {
+    let place = workplace();
+    for clock in ["virtual", "lockstep"] {
+        for mode in ["kinematic", "impedance"] {
+            let run = ["run", "scene.toml", "--clock", clock, "--hand-mode", mode, "--seconds", "0.05"];
+            let opened = openings(&place.path("default.csv"), || {
+                let said = place.run(run);
+                assert_eq!(said.status, Some(0), "{}", said.err);
+            });
+            assert_eq!(opened, 1, "{clock}, {mode}");
+        }
+    }
+    let device = |finger: &str| {
+        let file = place.path("default.csv");
+        format!("[[device]]\nbackend = \"ideal\"\nname = \"{finger}\"\nhand = \"{}\"\n", file.display())
+    };
+    let config = format!("clock = \"lockstep\"\n{}{}", device("f0"), device("f1"));
+    let opened = openings(&place.path("default.csv"), || drop(Driver::start(&config)));
+    assert_eq!(opened, 1);
 }
