@@ -34,10 +34,11 @@ pub struct ConvertArgs {
 /// A file that cannot be read or holds what it may not; a result that cannot be written.
 pub fn execute(args: &ConvertArgs) -> Result<Stop, RunFailure> {
     let mut inputs = vec![args.file.clone()];
+    let outputs: Vec<_> = args.out.iter().map(|out| Output::scene(out)).collect();
+    // A shell may have emptied it already, which would be told as a mistake in it.
+    outputs::check(&outputs, &[&args.file])?;
     let converted = convert(args, &mut inputs)?;
-    if let Some(out) = &args.out {
-        outputs::check(&[Output::scene(out)], &inputs.iter().collect::<Vec<_>>())?;
-    }
+    outputs::check(&outputs, &inputs.iter().collect::<Vec<_>>())?;
     for told in &converted.told {
         say(format_args!("phantom3: {told}"));
     }

@@ -71,6 +71,11 @@ impl<'a> Output<'a> {
         Self { option: "--repair", file, kind: Kind::Model }
     }
 
+    /// Of an option of calibration.
+    pub(crate) fn of_option(option: &'static str, file: &'a Path) -> Self {
+        Self { option, file, kind: Kind::Table }
+    }
+
     /// Of an export; its format has been looked at.
     pub(crate) fn table(file: &'a Path) -> Self {
         Self { option: "the table", file, kind: Kind::Table }
@@ -112,6 +117,15 @@ fn is_frame_in(directory: &Path, file: &Path) -> bool {
     };
     place.file_name().and_then(OsStr::to_str).is_some_and(is_frame)
         && place.parent().is_some_and(|parent| is_same_place(parent, &place_of(directory)))
+}
+
+/// Refuses standard streams that a shell has led into one of these files.
+///
+/// # Errors
+/// The first, with what to do.
+pub(crate) fn check_streams(outputs: &[Output<'_>], inputs: &[&PathBuf]) -> Result<(), RunFailure> {
+    check_standard_output(inputs)?;
+    outputs.iter().try_for_each(refuse_stream)
 }
 
 /// Refuses outputs that would overwrite an input or one another, or whose names say no format; the standard output, where

@@ -15,6 +15,8 @@ mod layout_file;
 mod live;
 mod report;
 
+use crate::outcome::RunFailure;
+use crate::outputs::{self, Output};
 use crate::record::destination::{is_same_file, is_same_place};
 use calibration::{Calibration, CalibrationError, Fit, Model, Pair, PairsError, calibrate, parse_pairs};
 use clap::builder::{OsStringValueParser, TypedValueParser};
@@ -118,6 +120,9 @@ pub enum CalibrateFailure {
         /// Their file.
         file: PathBuf,
     },
+    /// A standard stream is one of the files.
+    #[error(transparent)]
+    Stream(RunFailure),
     /// The pairs cannot be read.
     #[error("{}: cannot be read: {source}", file.display())]
     Unreadable {
@@ -278,6 +283,7 @@ impl Plan {
             other => other.clone(),
         };
         refuse_same_file(args, write.as_deref())?;
+        refuse_streams(args, write.as_deref())?;
         write.as_deref().map_or(Ok(()), layout_file::refuse_other_than_file)?;
         let edited = write.as_ref().filter(|file| file.exists());
         if let (Some(edited), Some(given)) = (edited, &args.layout)
@@ -318,6 +324,15 @@ fn refuse_same_file(args: &CalibrateArgs, write: Option<&Path>) -> Result<(), Ca
         }
     }
     Ok(())
+}
+
+/// The same, where a shell leads a standard stream into the file.
+fn refuse_streams(args: &CalibrateArgs, write: Option<&Path>) -> Result<(), CalibrateFailure> {
+    let outputs =
+        [("--write", write), ("--plot", args.plot.as_deref()), ("--save-pairs", args.save_pairs.as_deref())];
+    let outputs = outputs.into_iter().filter_map(|(option, file)| Some(Output::of_option(option, file?)));
+    let inputs: Vec<&PathBuf> = args.pairs.iter().chain(&args.layout).collect();
+    outputs::check_streams(&outputs.collect::<Vec<_>>(), &inputs).map_err(CalibrateFailure::Stream)
 }
 
 /// The pairs, and where they come from in words.

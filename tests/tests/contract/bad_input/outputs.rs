@@ -5,6 +5,9 @@ use std::fs;
 use system_tests::faults::scarcity::mounted_twice;
 use system_tests::workplace::{Running, Workplace};
 
+/// Of two devices, a tenth of a metre apart.
+const PAIRS: &str = "0 0 0 0.1 0 0\n0.1 0 0 0.2 0 0\n0 0.1 0 0.1 0.1 0\n0 0 0.1 0.1 0 0.1\n";
+
 /// A recording and its table, of more than a megabyte.
 fn with_long_recording() -> (Workplace, Vec<u8>) {
     let place = workplace();
@@ -261,8 +264,13 @@ fn no_standard_stream_is_a_file_that_is_read_or_written_besides() {
     let place = workplace();
     with_recordings(&place);
     place.write("orders.csv", "at 0.1 reset\n");
+    with_list(&place);
+    place.write("pairs.csv", PAIRS);
     let run = "run scene.toml --clock virtual --seconds 0.1";
     let live = "run scene.toml --clock lockstep --seconds 0.1 --orders -";
+    let calibrate = "calibrate --pairs pairs.csv";
+    place.write("p.svg", PRECIOUS);
+    place.write("phantom3-demo.csv", PRECIOUS);
     let cases = [
         ("good.mcap", "export good.mcap - 1<>good.mcap".to_owned(), "the standard output would overwrite"),
         ("good.mcap", "export good.mcap /dev/stdout >>good.mcap".to_owned(), "would overwrite the input"),
@@ -273,6 +281,16 @@ fn no_standard_stream_is_a_file_that_is_read_or_written_besides() {
         ("out.csv", format!("{run} --events out.csv 1<>out.csv"), "the standard output goes to"),
         ("orders.csv", format!("{live} --record orders.csv <orders.csv"), "the standard input comes from"),
         ("orders.csv", format!("{live} --record - <orders.csv >>orders.csv"), "would overwrite the input -"),
+        ("objects.ini", "convert objects.ini >>objects.ini".into(), "the standard output would overwrite"),
+        ("ball.ini", "convert objects.ini >>ball.ini".into(), "the standard output would overwrite"),
+        ("pairs.csv", format!("{calibrate} >>pairs.csv"), "the standard output would overwrite the input"),
+        ("out.csv", format!("{calibrate} --json --write out.csv >>out.csv"), "the standard output goes to"),
+        (
+            "p.svg",
+            format!("{calibrate} --plot p.svg 1<>p.svg"),
+            "--plot p.svg is the file that the standard output",
+        ),
+        ("phantom3-demo.csv", "--headless >>phantom3-demo.csv".into(), "the standard output goes to"),
     ];
     for (file, command, words) in cases {
         let before = fs::read(place.path(file)).expect("a file");
@@ -288,7 +306,7 @@ fn no_standard_stream_is_a_file_that_is_read_or_written_besides() {
 #[test]
 fn a_layout_and_a_figure_whose_links_lead_to_one_place_are_refused() {
     let place = workplace();
-    place.write("pairs.csv", "0 0 0 0.1 0 0\n0.1 0 0 0.2 0 0\n0 0.1 0 0.1 0.1 0\n0 0 0.1 0.1 0 0.1\n");
+    place.write("pairs.csv", PAIRS);
     std::os::unix::fs::symlink("h.svg", place.path("h.toml")).expect("a link");
     let arguments = ["calibrate", "--pairs", "pairs.csv", "--write", "h.toml", "--plot", "h.svg"];
     let said = place.run(arguments);
