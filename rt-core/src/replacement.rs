@@ -2,13 +2,17 @@
 //!
 //! Problem: a command that is interrupted while it writes its result leaves half a file, and what was there before is
 //! gone.
-//! Model: the result goes into a file beside the place, which is renamed at the end. Pipes and devices are written
-//! directly, and so is a file whose directory takes no other. A link goes on leading to its file, which keeps its rights.
-//! A process that catches signals calls [`abandon_all`] before it ends.
-//! Invariant: at the place there is the former file or the whole new one, whatever ends the process; of an end that
-//! nobody catches a file is left whose name begins with a dot and ends in `.part`.
+//! Model: the result goes into a draft beside the place, which is renamed at the end. Where the directory takes no other
+//! file, the draft lies among the temporary files, and its content is copied over the former one at the end, once there
+//! is room for all of it. Pipes and devices are written directly, and so is a file without content whose directory takes
+//! no other. A link goes on leading to its file, which keeps its rights. A process that catches signals calls
+//! [`abandon_all`] before it ends.
+//! Invariant: at the place there is the former file or the whole new one, whatever ends the process, unless that is
+//! killed while it copies; of an end that nobody catches a draft is left, whose name begins with a dot and ends in `.part`.
 
-use crate::output_file;
+use crate::{limits, output_file};
+use nix::errno::Errno;
+use nix::fcntl::{FallocateFlags, fallocate};
 use std::fs::{File, OpenOptions, Permissions};
 use std::io;
 use std::os::unix::fs::OpenOptionsExt;
@@ -23,7 +27,7 @@ const MOST_LINKS: u32 = 40;
 
 struct Unfinished {
     /// `None`: it is written where it is to be.
-    beside: Option<PathBuf>,
+    draft: Option<PathBuf>,
     place: PathBuf,
 }
 
@@ -46,7 +50,9 @@ pub struct Held {
 pub struct Replacement {
     file: File,
     /// `None`: it is written where it is to be.
-    beside: Option<PathBuf>,
+    draft: Option<PathBuf>,
+    /// The draft lies among the temporary files, perhaps on another disk.
+    is_far: bool,
     /// The end of a chain of links.
     place: PathBuf,
     /// Claimed until the other one has its place.
@@ -54,10 +60,11 @@ pub struct Replacement {
 }
 
 impl Replacement {
-    /// Begins a file that is to be here. Where it is written directly it has its former content until it is emptied.
+    /// Begins a file that is to be here.
     ///
     /// # Errors
-    /// If it could not take its place: what is there cannot be written, another process writes it, a pipe without a reader.
+    /// If it could not take its place: what is there cannot be written, another process writes it, a pipe without a reader;
+    /// or there is no place for a draft of what would cost a former content.
     pub fn begin(path: &Path) -> io::Result<Self> {
         let (place, former) = match path.metadata() {
             Ok(found) if found.is_file() && !is_descriptor(path) => {
@@ -69,27 +76,33 @@ impl Replacement {
             _ => return Self::directly(path),
         };
         let (former, rights) = former.unzip();
-        match create_beside(&place, rights.as_ref()) {
-            Ok((file, beside)) => {
-                unfinished().push(Unfinished { beside: Some(beside.clone()), place: place.clone() });
-                Ok(Self { file, beside: Some(beside), place, former })
+        match (create_beside(&place, rights.as_ref()), &former) {
+            (Ok((file, draft)), _) => Ok(Self::drafted(file, draft, false, place, former)),
+            (Err(error), Some(content)) if content.metadata()?.len() > 0 => {
+                let (file, draft) = create_among_temporary_files(&place, &error)?;
+                Ok(Self::drafted(file, draft, true, place, former))
             }
-            Err(_) if former.is_some() => {
+            (Err(_), Some(_)) => {
                 // The next one makes the same claim.
                 drop(former);
                 Self::directly(&place)
             }
-            Err(error) => Err(error),
+            (Err(error), None) => Err(error),
         }
+    }
+
+    fn drafted(file: File, draft: PathBuf, is_far: bool, place: PathBuf, former: Option<File>) -> Self {
+        unfinished().push(Unfinished { draft: Some(draft.clone()), place: place.clone() });
+        Self { file, draft: Some(draft), is_far, place, former }
     }
 
     fn directly(place: &Path) -> io::Result<Self> {
         let file = output_file::open(place, OpenOptions::new().write(true))?;
         if file.metadata()?.is_file() {
             output_file::claim(&file)?;
-            unfinished().push(Unfinished { beside: None, place: place.into() });
+            unfinished().push(Unfinished { draft: None, place: place.into() });
         }
-        Ok(Self { file, beside: None, place: place.into(), former: None })
+        Ok(Self { file, draft: None, is_far: false, place: place.into(), former: None })
     }
 
     /// The file to write to.
@@ -101,24 +114,33 @@ impl Replacement {
     }
 
     /// The place stays as it was until the end.
+    pub fn is_drafted(&self) -> bool {
+        self.draft.is_some()
+    }
+
+    /// It takes the place in one step, so that nobody ever reads half of it.
     pub fn is_beside(&self) -> bool {
-        self.beside.is_some()
+        self.is_drafted() && !self.is_far
     }
 
     /// Takes the place.
     ///
     /// # Errors
-    /// If that fails, which leaves the place as it was; or another process writes there now.
+    /// If that fails, which leaves the place as it was, but for [`is_torn`]; or another process writes there now.
     pub fn keep(mut self) -> io::Result<()> {
-        let Some(beside) = self.beside.take() else { return Ok(()) };
+        let Some(draft) = self.draft.take() else { return Ok(()) };
         let mut all = unfinished();
-        let renamed = self.claim_newcomer().and_then(|_newcomer| std::fs::rename(&beside, &self.place));
-        if renamed.is_err() {
+        let moved = match &self.former {
+            Some(former) if self.is_far => copy_over(former, &draft),
+            _ => self.claim_newcomer().and_then(|_newcomer| std::fs::rename(&draft, &self.place)),
+        };
+        let is_of_use = moved.as_ref().is_err_and(is_torn);
+        if (moved.is_err() || self.is_far) && !is_of_use {
             // Should it be gone already, so much the better.
-            let _ = std::fs::remove_file(&beside);
+            let _ = std::fs::remove_file(&draft);
         }
-        all.retain(|other| other.beside.as_deref() != Some(&beside));
-        renamed
+        all.retain(|other| other.draft.as_deref() != Some(&draft));
+        moved
     }
 
     /// Claims what is there now and was not before: a run may record into it.
@@ -135,13 +157,13 @@ impl Replacement {
 
 impl Drop for Replacement {
     fn drop(&mut self) {
-        let Self { beside, place, .. } = &*self;
+        let Self { draft, place, .. } = &*self;
         let mut all = unfinished();
-        if let Some(beside) = beside {
+        if let Some(draft) = draft {
             // Should it be gone already, so much the better.
-            let _ = std::fs::remove_file(beside);
+            let _ = std::fs::remove_file(draft);
         }
-        all.retain(|other| &other.beside != beside || &other.place != place);
+        all.retain(|other| &other.draft != draft || &other.place != place);
     }
 }
 
@@ -152,7 +174,7 @@ impl Drop for Replacement {
 pub fn write(path: &Path, content: impl AsRef<[u8]>) -> io::Result<()> {
     use std::io::Write;
     let replacement = Replacement::begin(path)?;
-    if !replacement.is_beside() && replacement.file.metadata()?.is_file() {
+    if !replacement.is_drafted() && replacement.file.metadata()?.is_file() {
         replacement.file.set_len(0)?;
     }
     (&replacement.file).write_all(content.as_ref())?;
@@ -164,7 +186,7 @@ pub fn write(path: &Path, content: impl AsRef<[u8]>) -> io::Result<()> {
 pub fn abandon_all() -> (Vec<Abandoned>, Held) {
     let mut all = unfinished();
     let abandon = |file: Unfinished| {
-        let is_gone = file.beside.is_some_and(|beside| std::fs::remove_file(beside).is_ok());
+        let is_gone = file.draft.is_some_and(|draft| std::fs::remove_file(draft).is_ok());
         Abandoned { place: file.place, is_gone }
     };
     (all.drain(..).map(abandon).collect(), Held { _all: all })
@@ -191,7 +213,62 @@ fn target_of(path: &Path) -> io::Result<PathBuf> {
     Err(io::Error::other("too many links lead to one another"))
 }
 
+/// With the rights of the file whose place it is to take.
 fn create_beside(place: &Path, rights: Option<&Permissions>) -> io::Result<(File, PathBuf)> {
+    let (file, draft) = create_draft(place, place.parent().unwrap_or(Path::new("")), 0o666)?;
+    match rights.map_or(Ok(()), |rights| file.set_permissions(rights.clone())) {
+        Ok(()) => Ok((file, draft)),
+        Err(error) => {
+            // It cannot take the place of the other one, and nobody else would remove it.
+            let _ = std::fs::remove_file(&draft);
+            Err(error)
+        }
+    }
+}
+
+/// Where nobody else may read it, whoever may read the place.
+fn create_among_temporary_files(place: &Path, beside: &io::Error) -> io::Result<(File, PathBuf)> {
+    create_draft(place, &std::env::temp_dir(), 0o600).map_err(|error| {
+        io::Error::other(format!(
+            "what is there is kept until the new file is whole, for which there is no place: beside it ({beside}), or among \
+             the temporary files ({error}); set TMPDIR to a directory that can be written"
+        ))
+    })
+}
+
+/// Puts the draft's content in the place of the former one, once there is room for all of it.
+fn copy_over(mut former: &File, draft: &Path) -> io::Result<()> {
+    let mut content = File::open(draft)?;
+    let bytes = content.metadata()?.len();
+    if limits::largest_file().is_some_and(|most| bytes > most) {
+        return Err(Errno::EFBIG.into());
+    }
+    let room = i64::try_from(bytes).unwrap_or(i64::MAX);
+    let reserved = fallocate(former, FallocateFlags::FALLOC_FL_KEEP_SIZE, 0, room);
+    // Other errors are those of a file system that cannot answer, and of nothing that is to be copied.
+    if let Err(full @ (Errno::ENOSPC | Errno::EDQUOT | Errno::EFBIG)) = reserved {
+        return Err(full.into());
+    }
+    former.set_len(former.metadata()?.len().min(bytes))?;
+    let copied = io::copy(&mut content, &mut former);
+    copied.map(drop).map_err(|source| io::Error::other(Torn { source, draft: draft.into() }))
+}
+
+/// Why a place has half of the new file.
+#[derive(Debug, thiserror::Error)]
+#[error("{source}; only a part of it is there, and the whole is in {}", draft.display())]
+struct Torn {
+    source: io::Error,
+    draft: PathBuf,
+}
+
+/// The error is that of a place that has neither the former file nor the whole new one.
+pub fn is_torn(error: &io::Error) -> bool {
+    error.get_ref().and_then(|inner| inner.downcast_ref::<Torn>()).is_some()
+}
+
+/// A new file in this directory, called after the place that it is for.
+fn create_draft(place: &Path, directory: &Path, mode: u32) -> io::Result<(File, PathBuf)> {
     static COUNT: AtomicU64 = AtomicU64::new(0);
     let name = place.file_name().ok_or_else(|| io::Error::from(io::ErrorKind::InvalidInput))?;
     loop {
@@ -200,22 +277,11 @@ fn create_beside(place: &Path, rights: Option<&Permissions>) -> io::Result<(File
         // A name may have 255 bytes.
         hidden.push(if name.len() < 200 { name } else { "result".as_ref() });
         hidden.push(format!(".{}-{count}.part", std::process::id()));
-        let beside = place.with_file_name(hidden);
-        match OpenOptions::new().write(true).create_new(true).mode(0o666).open(&beside) {
-            Ok(file) => {
-                let given = rights.map_or(Ok(()), |rights| file.set_permissions(rights.clone()));
-                return match given {
-                    Ok(()) => Ok((file, beside)),
-                    Err(error) => {
-                        // It cannot take the place of the other one, and nobody else would remove it.
-                        let _ = std::fs::remove_file(&beside);
-                        Err(error)
-                    }
-                };
-            }
+        let draft = directory.join(hidden);
+        match OpenOptions::new().write(true).create_new(true).mode(mode).open(&draft) {
             // Left by another process of this number.
             Err(error) if error.kind() == io::ErrorKind::AlreadyExists => {}
-            Err(error) => return Err(error),
+            made => return made.map(|file| (file, draft)),
         }
     }
 }
@@ -268,6 +334,35 @@ mod tests {
         assert_eq!(std::fs::read(&place).expect("there"), b"");
         drop(other);
         write(&place, "x").expect("free again");
+    }
+
+    /// A thread of another user, for whom the directory takes no file; root may write everywhere.
+    #[test]
+    fn a_file_whose_directory_takes_no_other_stays_until_the_new_one_is_whole() {
+        let directory = tempfile::tempdir().expect("a directory");
+        let place = directory.path().join("a");
+        std::fs::write(&place, "former").expect("room");
+        std::fs::set_permissions(&place, Permissions::from_mode(0o666)).expect("our own");
+        std::fs::set_permissions(directory.path(), Permissions::from_mode(0o555)).expect("our own");
+        let write_as_nobody = || {
+            if nix::unistd::geteuid().is_root() {
+                nix::unistd::setfsuid(nix::unistd::Uid::from_raw(65534));
+            }
+            let begun = Replacement::begin(&place).expect("begun");
+            begun.file().and_then(|mut file| file.write_all(b"half")).expect("room");
+            assert_eq!([begun.is_drafted(), begun.is_beside()], [true, false]);
+            let draft = begun.draft.clone().expect("a draft");
+            drop(begun);
+            assert_eq!(std::fs::read(&place).expect("there"), b"former");
+            assert!(!draft.exists());
+            write(&place, "new").expect("room");
+            assert_eq!(std::fs::read(&place).expect("there"), b"new");
+            write(&place, "longer than before").expect("room");
+        };
+        std::thread::scope(|scope| scope.spawn(write_as_nobody).join()).expect("no panic");
+        assert_eq!(std::fs::read(&place).expect("there"), b"longer than before");
+        assert_eq!(names(directory.path()), ["a"]);
+        std::fs::set_permissions(directory.path(), Permissions::from_mode(0o755)).expect("our own");
     }
 
     #[test]

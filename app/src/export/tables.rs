@@ -16,7 +16,7 @@ use crate::row::{BodyRow, Row};
 use io_driver::say::say;
 use parquet::errors::ParquetError;
 use rt_core::output_file::is_claimed;
-use rt_core::replacement::Replacement;
+use rt_core::replacement::{Replacement, is_torn};
 use std::io;
 use std::path::{Path, PathBuf};
 
@@ -81,11 +81,11 @@ impl Tables {
         });
     }
 
-    /// Leaves those places as they were that are not written directly; the failure that this is.
+    /// Leaves those places as they were that have drafts; the failure that this is.
     pub(super) fn give_up(self, why: &dyn std::fmt::Display) -> RunFailure {
-        let is_beside = |table: &Table| table.replacement.as_ref().is_some_and(Replacement::is_beside);
+        let is_drafted = |table: &Table| table.replacement.as_ref().is_some_and(Replacement::is_drafted);
         let part =
-            self.open.iter().find(|table| !is_beside(table)).map(|table| table.out.display().to_string());
+            self.open.iter().find(|table| !is_drafted(table)).map(|table| table.out.display().to_string());
         let left = part.map_or_else(|| NOTHING_LEFT.to_owned(), |part| format!("{part} is not complete"));
         RunFailure::Results(format!("{why}; no table is written: {left}"))
     }
@@ -167,11 +167,11 @@ impl Format {
 impl Ended {
     /// In words; `None`: who reads the standard output has seen enough.
     fn tell(self, out: &Path, replacement: Option<&Replacement>) -> Option<RunFailure> {
-        let is_beside = replacement.is_some_and(Replacement::is_beside);
+        let is_drafted = replacement.is_some_and(Replacement::is_drafted);
         let place = out.display();
         let words = match self {
             Self::Csv(error) if error.is_of_a_reader_who_left() => return None,
-            Self::Csv(RecordingError::Write { file, source, .. }) if is_beside => {
+            Self::Csv(RecordingError::Write { file, source, .. }) if is_drafted => {
                 format!("cannot write {}: {source}; {NOTHING_LEFT}", file.display())
             }
             Self::Csv(RecordingError::Write { file, source, rows, .. }) => {
@@ -182,7 +182,7 @@ impl Ended {
             }
             Self::Csv(error) => error.to_string(),
             Self::Parquet(error) => {
-                let left = if is_beside { NOTHING_LEFT } else { "what is there is of no use" };
+                let left = if is_drafted { NOTHING_LEFT } else { "what is there is of no use" };
                 format!(
                     "cannot write {place}: {error}; a Parquet file without its end cannot be read: {left}"
                 )
@@ -205,5 +205,6 @@ fn not_created(out: &Path, error: &io::Error) -> RunFailure {
 }
 
 fn not_kept(out: &Path, error: &io::Error) -> RunFailure {
-    RunFailure::Results(format!("cannot write {}: {error}; {NOTHING_LEFT}", out.display()))
+    let left = if is_torn(error) { String::new() } else { format!("; {NOTHING_LEFT}") };
+    RunFailure::Results(format!("cannot write {}: {error}{left}", out.display()))
 }

@@ -162,6 +162,37 @@ fn a_table_that_cannot_have_the_rights_of_the_earlier_one_leaves_nothing_beside_
     assert!(left.is_empty(), "{left:?}");
 }
 
+/// A directory that takes no other file, and a table that comes to no end.
+#[test]
+fn an_earlier_table_beside_which_there_is_no_place_stays_until_the_new_one_is_whole() {
+    let place = workplace();
+    recorded(&place, "20", &["r.mcap"]);
+    for name in ["o.parquet", "o.csv"] {
+        place.write(name, "earlier");
+        let before = place.snapshot();
+        let arguments = ["export", "r.mcap", name];
+        let export = |limits: &str| {
+            let mut program = place.prepare(Command::new("strace"));
+            program.args(["-f", "-o", "/dev/null", "-e", "trace=fchmod", "-e", "inject=fchmod:error=EPERM"]);
+            program.arg(place.phantom3().get_program()).args(arguments);
+            Running::start(limited(&program, limits)).wait()
+        };
+        if with_failing(&place, "fchmod:error=EPERM", &["--version"]).is_none() {
+            return;
+        }
+        std::fs::remove_file(place.path("calls.txt")).expect("of strace");
+        let said = export("-f 100");
+        assert_eq!(said.status, Some(3), "{name}: {}", said.err);
+        assert!(said.err.contains("what was there is as it was"), "{name}: {}", said.err);
+        assert!(place.snapshot() == before, "{name}: {}", said.err);
+        let said = export("-f unlimited");
+        assert_eq!(said.status, Some(0), "{name}: {}", said.err);
+        assert!(bytes(&place, name).len() > 100_000, "{name}");
+        let names: Vec<_> = place.snapshot().into_keys().collect();
+        assert!(names == before.into_keys().collect::<Vec<_>>(), "{names:?}");
+    }
+}
+
 #[test]
 fn a_recording_for_which_there_is_too_little_memory_ends_with_words_and_not_with_a_panic() {
     let place = workplace();
