@@ -53,7 +53,9 @@ pub fn no_process(error: &io::Error) -> String {
     }
 }
 
-fn more_processes() -> String {
+/// Remedy for a lack of processes or threads.
+#[must_use]
+pub fn more_processes() -> String {
     limit(Resource::RLIMIT_NPROC).map_or_else(
         || "end other programs, or raise the limit of the control group (TasksMax=, `docker run --pids-limit`)".into(),
         |most| format!("raise the limit of processes (`ulimit -u`, now {most}; TasksMax= of a service)"),

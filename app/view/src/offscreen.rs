@@ -3,12 +3,17 @@
 //! Model: threads as many as drawing takes are tried first, since Mesa waits for ever for those that it does not get.
 //! `libEGL` is looked for when a picture is wanted, and asked for a context without a surface. Mesa's has one that
 //! draws in software where there is no graphics card. A machine without the library misses pictures and nothing else.
+//! All contexts of a process draw with the same threads of Mesa. So a thread draws a single colour first: should Mesa lack
+//! one of its own, it is that thread which waits for ever, and nobody waits for it longer than [`TRIAL`].
 
 use khronos_egl as egl;
 use rt_core::limits;
 use std::fs::File;
 use std::io;
+use std::sync::mpsc::{RecvTimeoutError, channel};
 use std::sync::{Arc, Mutex};
+use std::time::Duration;
+use three_d::{ClearState, Interpolation, Texture2D, Wrapping};
 
 /// `EGL_PLATFORM_SURFACELESS_MESA`.
 const SURFACELESS: egl::Enum = 0x31DD;
@@ -52,6 +57,12 @@ pub enum NoPictures {
     /// Lack of threads: drawing in software would wait for ever for those that it did not get.
     #[error("no pictures: {0}")]
     Threads(String),
+    /// Nothing is drawn, and no error told.
+    #[error(
+        "no pictures: the graphics library drew nothing within {} s, as happens for ever when it lacks one of its threads; {}",
+        TRIAL.as_secs(), limits::more_processes()
+    )]
+    Stuck,
     /// There is a context, and it cannot do what is needed.
     #[error("no pictures: {0}")]
     Graphics(String),
@@ -75,6 +86,11 @@ impl Offscreen {
     /// What is missing, and what to do about it.
     pub fn new() -> Result<Self, NoPictures> {
         refuse_without_threads()?;
+        refuse_if_stuck()?;
+        Self::make()
+    }
+
+    fn make() -> Result<Self, NoPictures> {
         // SAFETY: the library is the system's own graphics library; its initialisers are trusted as every program's are that
         // draws anything.
         let egl = unsafe { egl::DynamicInstance::<egl::EGL1_5>::load_required() }
@@ -91,6 +107,14 @@ impl Offscreen {
         let context = three_d::Context::from_gl_context(Arc::new(gl))
             .map_err(|error| NoPictures::Graphics(error.to_string()))?;
         Ok(Self { context, renderer, egl, display, own })
+    }
+
+    /// A single colour, read back.
+    fn draw_a_colour(&self) {
+        let (near, edge) = (Interpolation::Nearest, Wrapping::ClampToEdge);
+        let colour = Texture2D::new_empty::<[u8; 4]>(&self.context, 64, 64, near, near, None, edge, edge);
+        let target = colour.as_color_target(None);
+        let _: Vec<[u8; 4]> = target.clear(ClearState::color(1.0, 1.0, 1.0, 1.0)).read();
     }
 }
 
@@ -144,6 +168,30 @@ fn refuse_without_threads() -> Result<(), NoPictures> {
         let started = (0..count).map(start).collect::<io::Result<Vec<_>>>();
         started.map(drop).map_err(|error| NoPictures::Threads(limits::no_thread(&error)))
     })
+}
+
+/// For the first colour, on a machine where others work, too.
+const TRIAL: Duration = Duration::from_secs(5);
+
+/// Draws in a thread that is left behind if it does not come to an end.
+fn refuse_if_stuck() -> Result<(), NoPictures> {
+    let (tell, steps) = channel();
+    let draw = move || {
+        let made = Offscreen::make();
+        // Whoever listens has given up otherwise.
+        let _ = tell.send(());
+        let drawn = made.map(|made| made.draw_a_colour());
+        let _ = tell.send(());
+        drawn
+    };
+    let thread = std::thread::Builder::new().name("trial".into()).stack_size(STACK_BYTES).spawn(draw);
+    let thread = thread.map_err(|error| NoPictures::Threads(limits::no_thread(&error)))?;
+    // To load the library may take its time.
+    let is_made = steps.recv().is_ok();
+    if is_made && steps.recv_timeout(TRIAL) == Err(RecvTimeoutError::Timeout) {
+        return Err(NoPictures::Stuck);
+    }
+    thread.join().unwrap_or_else(|_| Err(NoPictures::Graphics("the graphics library cannot draw".into())))
 }
 
 fn no_library(reason: String) -> NoPictures {

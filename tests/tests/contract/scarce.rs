@@ -7,6 +7,7 @@ use std::os::unix::fs::PermissionsExt;
 use std::path::Path;
 use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
+use system_tests::c_program::library;
 use system_tests::faults::scarcity::limited;
 use system_tests::workplace::{Running, Said, Workplace};
 
@@ -302,6 +303,28 @@ fn pictures_for_which_there_is_too_little_memory_or_are_too_few_threads_are_a_fa
         // It had waited for half a minute.
         assert!(begun.elapsed() < Duration::from_secs(25), "{processes}: {:?}", begun.elapsed());
     }
+}
+
+/// The library waits for ever for threads that it did not get, and tells nobody.
+#[test]
+fn a_graphics_library_that_lacks_a_single_thread_holds_no_run() {
+    let place = workplace();
+    let Some(few) = library("few_threads", &place.path("")) else { return };
+    let mut program = place.phantom3();
+    program.args(RUN).args(["0.1", "--frames", "film", "--picture-size", "64x48", "--record", "o.csv"]);
+    program.env("LD_PRELOAD", few);
+    let begun = Instant::now();
+    let said = Running::start(program).wait();
+    if said.status == Some(0) || !said.err.contains("drew nothing within") && said.err.contains("no pictures")
+    {
+        eprintln!("skipped: this machine does not draw with Mesa's threads: {}", said.err);
+        return;
+    }
+    assert_eq!(said.status, Some(3), "{}{}", said.out, said.err);
+    assert!(said.err.contains("lacks one of its threads"), "{}", said.err);
+    assert!(begun.elapsed() < Duration::from_secs(20), "{:?}", begun.elapsed());
+    assert!(said.out.contains("MISSING NOT COMPLETE"), "{}", said.out);
+    assert!(said.out.contains("o.csv (100 rows)"), "{}", said.out);
 }
 
 #[test]
