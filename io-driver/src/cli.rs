@@ -47,7 +47,8 @@ pub struct Cli {
     command: DriverCommand,
 }
 
-const AFTER_HELP: &str = "Exit status: 0 done; 2 bad usage or input, nothing was started; 3 a fault during the run.\n\
+const AFTER_HELP: &str = "Exit status: 0 done; 2 bad usage or input, nothing was started; 3 a fault during the run, or a driver that does \
+not answer.\n\
 The socket lies at $PHANTOM3_SOCKET, or driver.sock in $RUNTIME_DIRECTORY, $XDG_RUNTIME_DIR/phantom3 or /run/phantom3.";
 
 /// What can be asked of the driver.
@@ -210,8 +211,14 @@ fn status(args: &StatusArgs) -> Result<(), AttachError> {
 fn report(result: Result<(), AttachError>) -> ExitCode {
     match result {
         Ok(()) => ExitCode::SUCCESS,
-        Err(error) => fail(&error, EXIT_USAGE),
+        Err(error) => fail_to_ask(&error),
     }
+}
+
+/// Somebody who listens and does not answer may have heard all the same; from everybody else nothing came.
+fn fail_to_ask(error: &AttachError) -> ExitCode {
+    let is_open = matches!(error, AttachError::NoAnswer { .. } | AttachError::HungUp { .. });
+    fail(error, if is_open { EXIT_FAULT } else { EXIT_USAGE })
 }
 
 pub(crate) fn fail(error: &dyn std::error::Error, code: u8) -> ExitCode {

@@ -21,6 +21,7 @@ use rt_core::log::LostCount;
 use rt_core::signals::StopSignals;
 use shm_abi::DriverMemory;
 use shm_abi::handshake::Verdict;
+use shm_abi::peer::ProcessWords;
 use shm_abi::server::{Recipient, Server, ServerEvent};
 use shm_abi::socket_file::SocketFile;
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -160,7 +161,7 @@ impl Recipient for Desk<'_> {
                 let lease = view.lease();
                 self.post(Letter::Grant(view))?;
                 bump(&self.memory.counters.leases_granted);
-                say(self.options, format_args!("lease {lease} to process {pid} ({name})"));
+                say(self.options, format_args!("lease {lease} to {} ({name})", ProcessWords(pid)));
             }
             ServerEvent::LeaseEnded { lease } => {
                 self.sender.urgent.end_lease(lease);
@@ -184,14 +185,22 @@ impl Recipient for Desk<'_> {
             ServerEvent::EmergencyStopRequested { pid, uid, .. } => {
                 // As of now: who asked before to leave a fault did not know of it, whatever the clock of who stops says.
                 self.sender.urgent.stop(Some(uid), monotonic_ns());
-                say(self.options, format_args!("emergency stop, asked for by process {pid} of user {uid}"));
+                say(
+                    self.options,
+                    format_args!("emergency stop, asked for by {} of user {uid}", ProcessWords(pid)),
+                );
             }
             ServerEvent::ZeroRequested { pid, devices, .. } => {
                 self.post(Letter::Zero(DeviceSet(devices)))?;
-                say(self.options, format_args!("process {pid} asks to zero devices (bits {devices:#x})"));
+                say(
+                    self.options,
+                    format_args!("{} asks to zero devices (bits {devices:#x})", ProcessWords(pid)),
+                );
             }
             ServerEvent::Trouble { message } => say::say(format_args!("io-driver: {message}")),
-            ServerEvent::StopRequested { pid } => self.stop = Some(format!("request of process {pid}")),
+            ServerEvent::StopRequested { pid } => {
+                self.stop = Some(format!("request of {}", ProcessWords(pid)))
+            }
         }
         Ok(())
     }

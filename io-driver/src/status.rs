@@ -1,6 +1,7 @@
 //! What a running driver is doing, for people and for programs.
 
 use crate::meter;
+use rt_core::clock::monotonic_ns;
 use rt_core::histogram::{Histogram, Summary};
 use serde::Serialize;
 use shm_abi::frame::{
@@ -31,6 +32,8 @@ pub struct Status {
     pub cpu: Option<usize>,
     /// Number of the newest tick.
     pub tick: Option<u64>,
+    /// Age of that tick (s), if a loop in real time should have had others since: it hangs, or is stopped.
+    pub silent_for_s: Option<f64>,
     /// State of the driver.
     pub state: &'static str,
     /// Why it is in the fault state.
@@ -183,6 +186,7 @@ impl Status {
             wait: info.wait_mode.name(),
             cpu: info.cpu,
             tick: frame.map(|f| f.tick),
+            silent_for_s: frame.and_then(|f| silence_s(&info, &f, monotonic_ns())),
             state: frame.map_or(DriverState::Starting.name(), |f| state_name(f.state)),
             fault: fault.map(FaultReason::sentence_for),
             lease: frame.map_or(0, |f| f.lease),
@@ -217,8 +221,9 @@ impl Status {
     /// One line, for watching.
     pub fn line(&self) -> String {
         let tips: Vec<String> = self.devices.iter().map(DeviceStatus::short).collect();
+        let ago = self.silent_for_s.map_or_else(String::new, |s| format!(" ({s:.1} s ago)"));
         format!(
-            "tick {} {} lease {} overruns {} missed {} | {}",
+            "tick {}{ago} {} lease {} overruns {} missed {} | {}",
             self.tick.unwrap_or(0),
             self.state,
             self.lease,
@@ -310,11 +315,15 @@ impl fmt::Display for Status {
             self.driver_pid, self.clock, self.rate_hz, self.wait
         )?;
         let fault = self.fault.as_ref().map_or_else(String::new, |why| format!(": {why}"));
-        writeln!(
+        write!(
             f,
             "state       {}{fault}, lease {}, authority {:.2}",
             self.state, self.lease, self.authority
         )?;
+        match self.silent_for_s {
+            Some(s) => writeln!(f, "; all of this was so {s:.1} s ago, its loop has had no tick since")?,
+            None => writeln!(f)?,
+        }
         let c = &self.counters;
         writeln!(f, "ticks       {} done, {} overruns", c.ticks, c.overruns)?;
         writeln!(
@@ -374,12 +383,15 @@ fn state_name(word: u64) -> &'static str {
     DriverState::from_word(word).map_or("unknown", DriverState::name)
 }
 
-/// Whether two looks at a driver in real time show that it moves.
-pub fn is_ticking(driver: &DriverView, wait: std::time::Duration) -> bool {
-    let before = driver.latest_tick();
-    std::thread::sleep(wait);
-    driver.info().clock_mode != ClockMode::Real || driver.latest_tick() != before
+/// Age of a frame at `now_ns` (s), if it is older than that of a loop in real time that ticks.
+fn silence_s(info: &DriverInfo, frame: &Frame, now_ns: u64) -> Option<f64> {
+    let age_ns = now_ns.saturating_sub(frame.read_ns);
+    let is_silent = info.clock_mode == ClockMode::Real && age_ns > SILENCE_NS + 5 * info.period_ns;
+    is_silent.then_some(age_ns as f64 / 1e9)
 }
+
+/// Time without a tick, beyond a few periods, that a busy machine does not explain.
+const SILENCE_NS: u64 = 100_000_000;
 
 #[cfg(test)]
 mod tests {
@@ -400,5 +412,29 @@ mod tests {
         let status = Status::of(&DriverView::map(memory.fd()).unwrap(), 1).to_string();
         let line = "state       unknown: a fault of a kind this version does not know (99), lease 0";
         assert!(status.contains(line), "{status}");
+    }
+
+    /// A loop that hangs leaves its last frame, which says that it pushes.
+    #[test]
+    fn a_frame_of_before_is_told_as_such_where_a_loop_should_tick() {
+        let text_of = |clock, age_ns| {
+            let text = format!("clock = \"{clock}\"\nrate_hz = 100\n[[device]]\nbackend = \"ideal\"\n");
+            let config = DriverConfig::parse(&text, "test.toml".as_ref()).unwrap();
+            let devices = crate::open::open_devices(&config).unwrap();
+            let memory = DriverMemory::create(&describe(&config, &devices, WaitMode::Futex)).unwrap();
+            memory.write_frame(&Frame { read_ns: monotonic_ns() - age_ns, ..Frame::zeroed() });
+            memory.ring(0, None);
+            let status = Status::of(&DriverView::map(memory.fd()).unwrap(), 1);
+            (status.to_string(), status.line())
+        };
+        const S: u64 = 1_000_000_000;
+        let (told, line) = text_of("real", 3 * S);
+        assert!(told.contains("; all of this was so 3.0 s ago, its loop has had no tick since"), "{told}");
+        assert!(line.starts_with("tick 0 (3.0 s ago) "), "{line}");
+        // Far less than 100 ms and five periods of 10 ms; a loop in lockstep waits as long as its commander.
+        for (clock, age_ns) in [("real", 0), ("lockstep", 3 * S)] {
+            let (told, line) = text_of(clock, age_ns);
+            assert!(!told.contains(" ago") && !line.contains(" ago"), "{told} {line}");
+        }
     }
 }

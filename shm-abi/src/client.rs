@@ -5,6 +5,7 @@
 
 use crate::handshake::{self, Answer, Request, RequestKind, Verdict};
 use crate::layout::{LAYOUT_HASH, MAGIC};
+use crate::peer::ProcessWords;
 use crate::segment::{self, CommanderMemory, DriverView, SegmentError};
 use crate::socket;
 use crate::stop_socket;
@@ -88,6 +89,15 @@ pub enum AttachError {
         /// What was found.
         detail: String,
     },
+    /// Whoever listens there took the request and closed the connection.
+    #[error(
+        "whoever listens at {socket} hung up without an answer, as a driver does that is just ending, and a program that is \
+         none; ask again, or name another socket"
+    )]
+    HungUp {
+        /// Where it was asked.
+        socket: PathBuf,
+    },
     /// The driver speaks another major version.
     #[error(
         "the driver speaks ABI version {found}, this program {expected}; install both from the same release"
@@ -112,8 +122,9 @@ pub enum AttachError {
     },
     /// Somebody commands already.
     #[error(
-        "the devices are commanded by process {pid} ({name}) already; end it, or its lease (`io-driver end-lease`), first; \
-         `io-driver status --watch` looks on"
+        "the devices are commanded by {} ({name}) already; end it, or its lease (`io-driver end-lease`), first; \
+         `io-driver status --watch` looks on",
+        ProcessWords(*pid)
     )]
     LeaseHeld {
         /// The holder's process id.
@@ -393,6 +404,14 @@ fn no_permission(path: &Path) -> AttachError {
     AttachError::NoPermission { socket, mode, owner, group, user: rustix::process::geteuid().as_raw() }
 }
 
+/// A driver that was killed is gone by now, and one that ended has removed its socket; another call tells.
+fn hung_up(socket: PathBuf) -> AttachError {
+    match connect(&socket) {
+        Err(gone @ (AttachError::NoDriver { .. } | AttachError::DriverGone { .. })) => gone,
+        _ => AttachError::HungUp { socket },
+    }
+}
+
 fn talk_error(path: &Path, error: io::Error) -> AttachError {
     let socket = path.to_path_buf();
     match error.kind() {
@@ -400,7 +419,7 @@ fn talk_error(path: &Path, error: io::Error) -> AttachError {
             AttachError::NoAnswer { socket, seconds: ANSWER_TIMEOUT.as_secs() }
         }
         io::ErrorKind::UnexpectedEof | io::ErrorKind::ConnectionReset | io::ErrorKind::BrokenPipe => {
-            AttachError::NotADriver { socket, detail: "it closed the connection without an answer".into() }
+            hung_up(socket)
         }
         _ => AttachError::System { what: "talk to the driver", socket, source: error },
     }

@@ -8,6 +8,7 @@
 use nix::libc;
 use nix::sys::socket::{getsockopt, sockopt};
 use rustix::process::{Pid, PidfdFlags, pidfd_open};
+use std::fmt;
 use std::io;
 use std::os::fd::{AsFd, AsRawFd, BorrowedFd, OwnedFd};
 
@@ -38,6 +39,19 @@ impl Peer {
         let mut groups = supplementary_groups(connection).unwrap_or_default();
         groups.push(self.gid);
         groups
+    }
+}
+
+/// Number of a process in words; 0 is what the kernel tells of one in a PID namespace that the asker does not see.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct ProcessWords(pub u64);
+
+impl fmt::Display for ProcessWords {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self.0 {
+            0 => f.write_str("a process of another PID namespace"),
+            pid => write!(f, "process {pid}"),
+        }
     }
 }
 

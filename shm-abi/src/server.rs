@@ -20,7 +20,7 @@ mod connection;
 mod places;
 
 use crate::handshake::{self, Answer, Request, RequestKind, Verdict};
-use crate::peer::{Peer, Process, refuse_descriptors};
+use crate::peer::{Peer, Process, ProcessWords, refuse_descriptors};
 use crate::rights::{Right, Rights};
 use crate::segment::{CommanderView, DriverMemory, LeaseOffer};
 use crate::socket;
@@ -444,7 +444,7 @@ impl Server {
             let is_granted = match mapped.seal() {
                 Ok(view) => to.take(ServerEvent::LeaseGranted { view, pid, name }).is_ok(),
                 Err(error) => {
-                    let message = format!("process {pid} ({name}) gets no lease: {error}");
+                    let message = format!("{} ({name}) gets no lease: {error}", ProcessWords(pid));
                     let _ = to.take(ServerEvent::Trouble { message });
                     false
                 }

@@ -16,6 +16,7 @@ use std::io::Write;
 use std::os::fd::AsFd;
 use std::os::unix::fs::FileExt;
 use std::os::unix::net::{UnixListener, UnixStream};
+use std::path::Path;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Duration;
 
@@ -122,19 +123,39 @@ fn a_client_refuses_every_other_make_of_driver_by_name() {
     }
 }
 
+/// Error of a client whose connection is closed after `before_it_closes` of the listener and its place.
+fn error_after_hanging_up(before_it_closes: fn(UnixListener, &Path) -> Option<UnixListener>) -> AttachError {
+    let directory = directory();
+    let socket = directory.path().join("driver.sock");
+    let listener = UnixListener::bind(&socket).unwrap();
+    let place = socket.clone();
+    let server = std::thread::spawn(move || {
+        let (mut stream, _) = listener.accept().unwrap();
+        hear(&mut stream);
+        before_it_closes(listener, &place)
+    });
+    let error = watched(limit(), "the client's end", || client::command(&socket, "test").unwrap_err());
+    drop(server.bounded_join().unwrap());
+    error
+}
+
 #[test]
-fn a_socket_that_says_nothing_and_closes_is_no_drivers() {
-    for talk in [|_: UnixStream| (), |mut stream: UnixStream| hear(&mut stream)] {
-        let error = error_about(talk);
-        assert!(matches!(error, AttachError::NotADriver { .. }), "{error:?}");
-        let message = error.to_string();
-        assert!(
-            message.ends_with(
-                "is not a driver's socket: it closed the connection without an answer; name another one"
-            ),
-            "{message}"
-        );
-    }
+fn a_listener_that_hangs_up_is_no_driver_or_one_that_ends() {
+    let error = error_after_hanging_up(|listener, _| Some(listener));
+    assert!(matches!(error, AttachError::HungUp { .. }), "{error:?}");
+    let message = error.to_string();
+    assert!(message.contains("hung up without an answer, as a driver does that is just ending"), "{message}");
+}
+
+#[test]
+fn a_driver_that_ends_before_it_answers_is_gone() {
+    let killed = error_after_hanging_up(|_, _| None);
+    assert!(matches!(killed, AttachError::DriverGone { .. }), "{killed:?}");
+    let stopped = error_after_hanging_up(|_, place| {
+        std::fs::remove_file(place).unwrap();
+        None
+    });
+    assert!(matches!(stopped, AttachError::NoDriver { .. }), "{stopped:?}");
 }
 
 #[test]

@@ -4,7 +4,7 @@
 //! there, a pressed switch or a card without power, and then the next tick is a fault again. Which fault was left is what
 //! the frame before the request tells.
 
-use super::{EXIT_FAULT, EXIT_USAGE, fail};
+use super::{EXIT_FAULT, fail_to_ask};
 use crate::print::print_line;
 use crate::say::say;
 use shm_abi::client;
@@ -24,7 +24,7 @@ pub(super) fn clear_fault(socket: &Path) -> ExitCode {
     let observer = client::observe(socket, NAME);
     let before = observer.as_ref().ok().and_then(|observer| observer.driver.read_latest());
     if let Err(error) = client::clear_fault(socket, NAME) {
-        return fail(&error, EXIT_USAGE);
+        return fail_to_ask(&error);
     }
     let failed = |why: std::fmt::Arguments<'_>| {
         say(format_args!("io-driver: {why}"));

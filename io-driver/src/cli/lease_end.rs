@@ -5,7 +5,7 @@
 //! none. Whoever gets no place to look from is told so.
 
 use super::clearing::{LOOK, PROMPT};
-use super::{EXIT_FAULT, EXIT_USAGE, fail};
+use super::{EXIT_FAULT, fail_to_ask};
 use crate::print::print_line;
 use crate::say::say;
 use shm_abi::{DriverView, client};
@@ -20,7 +20,7 @@ pub(super) fn end_lease(socket: &Path) -> ExitCode {
     let observer = client::observe(socket, NAME);
     let before = observer.as_ref().map(|observer| observer.driver.read_latest());
     if let Err(error) = client::end_lease(socket, NAME) {
-        return fail(&error, EXIT_USAGE);
+        return fail_to_ask(&error);
     }
     let said = match (&observer, before) {
         (_, Ok(Some(frame))) if frame.lease == 0 => "nobody commanded the devices".into(),

@@ -32,8 +32,10 @@ pub(super) fn all() -> impl Iterator<Item = Listener> {
         // A name in it may be any bytes.
         let table = std::fs::read(format!("/proc/{pid}/net/unix")).unwrap_or_default();
         let table = String::from_utf8_lossy(&table).into_owned();
+        let status = std::fs::read_to_string(format!("/proc/{pid}/status")).unwrap_or_default();
+        let own = own_number(&status).unwrap_or(pid);
         let directory = || std::fs::read_link(format!("/proc/{pid}/cwd")).unwrap_or_default();
-        let sockets = sockets_of(pid, &table).into_iter().map(|socket| directory().join(socket));
+        let sockets = sockets_of(own, &table).into_iter().map(|socket| directory().join(socket));
         sockets.collect::<Vec<PathBuf>>().into_iter().map(move |socket| Listener { pid, socket })
     })
 }
@@ -46,6 +48,11 @@ fn drivers() -> impl Iterator<Item = u32> {
         let name = std::fs::read_to_string(format!("/proc/{pid}/comm")).unwrap_or_default();
         PROGRAMS.iter().any(|program| name.starts_with(program))
     })
+}
+
+/// A process's number where it lives, proc(5): in a container it names its socket by that.
+fn own_number(status: &str) -> Option<u32> {
+    status.lines().find_map(|line| line.strip_prefix("NSpid:"))?.split_whitespace().next_back()?.parse().ok()
 }
 
 /// The driver's sockets that a table tells of, each once: a connection that was taken has a line with the same name.
@@ -80,6 +87,13 @@ mod tests {
         ] {
             assert_eq!(socket_of(77, other), None);
         }
+    }
+
+    #[test]
+    fn a_driver_in_a_container_has_a_number_of_its_own_there() {
+        assert_eq!(own_number("Name:\tio-driver\nPid:\t4711\nNSpid:\t4711\t23\t1\n"), Some(1));
+        assert_eq!(own_number("Pid:\t4711\nNSpid:\t4711\n"), Some(4711));
+        assert_eq!(own_number("Pid:\t4711\n"), None);
     }
 
     #[test]

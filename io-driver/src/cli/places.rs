@@ -94,7 +94,9 @@ pub(super) fn nobody_asked(places: &Places, not_asked: &[NotAsked]) -> ExitCode 
         say(format_args!("io-driver: {error}"));
     }
     // Somebody listens and says nothing: nobody knows what became of the motors.
-    let is_silent = not_asked.iter().any(|(_, error)| !is_elsewhere(error));
+    let is_silent = not_asked
+        .iter()
+        .any(|(_, error)| !is_elsewhere(error) || matches!(error, AttachError::HungUp { .. }));
     let mut code = if is_silent { EXIT_FAULT } else { EXIT_USAGE };
     for other in listeners::all() {
         let (pid, socket) = (other.pid, other.socket.display());
@@ -113,7 +115,7 @@ pub(super) fn nobody_asked(places: &Places, not_asked: &[NotAsked]) -> ExitCode 
     ExitCode::from(code)
 }
 
-/// There is no driver at this place for us to ask.
+/// There is no driver at this place for us to ask, or none for long.
 pub(super) fn is_elsewhere(error: &AttachError) -> bool {
     matches!(
         error,
@@ -121,6 +123,7 @@ pub(super) fn is_elsewhere(error: &AttachError) -> bool {
             | AttachError::DriverGone { .. }
             | AttachError::NoPermission { .. }
             | AttachError::NotADriver { .. }
+            | AttachError::HungUp { .. }
     )
 }
 

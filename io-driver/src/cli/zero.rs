@@ -19,6 +19,7 @@ use clap::Args;
 use rt_core::signals::StopSignals;
 use shm_abi::client::{self, AttachError, Attachment};
 use shm_abi::frame::{DEVICE_NOT_ZEROED, DEVICE_POSITION_VALID};
+use shm_abi::peer::ProcessWords;
 use shm_abi::{DeviceFrame, DriverState, DriverView, FaultReason, Frame};
 use std::borrow::Cow;
 use std::io::{BufRead, IsTerminal, Write};
@@ -100,7 +101,7 @@ impl ZeroError {
     fn is_usage(&self) -> bool {
         !matches!(
             self,
-            Self::Attach(AttachError::NoAnswer { .. })
+            Self::Attach(AttachError::NoAnswer { .. } | AttachError::HungUp { .. })
                 | Self::Silent(_)
                 | Self::DriverGone
                 | Self::Interrupted
@@ -235,7 +236,7 @@ impl<'a> Zeroing<'a> {
         let words = format!("the driver has not told within {PromptWords} who commands");
         match say_if_late(&words, || client::command(self.socket, NAME)) {
             Err(AttachError::LeaseHeld { pid, name }) => {
-                Err(ZeroError::Commanded(format!("process {pid} ({name})")))
+                Err(ZeroError::Commanded(format!("{} ({name})", ProcessWords(pid))))
             }
             // It has just ended; the driver judges by itself.
             _ => Ok(()),
@@ -315,7 +316,8 @@ impl<'a> Zeroing<'a> {
             if is_due && !self.was_granted(devices, &was_withheld) {
                 let answer = client::zero(self.socket, NAME, bits);
                 // What was not answered may have been heard.
-                *was_asked |= matches!(answer, Ok(()) | Err(AttachError::NoAnswer { .. }));
+                *was_asked |=
+                    matches!(answer, Ok(()) | Err(AttachError::NoAnswer { .. } | AttachError::HungUp { .. }));
                 answer?;
                 asked = Some(Instant::now());
             }

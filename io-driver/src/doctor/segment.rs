@@ -170,10 +170,12 @@ fn socket(_: &Machine<'_>, _: &str, answer: &Answer) -> Judged {
                 Remedy::words(text),
             )
         }
-        Err(AttachError::NotADriver { .. } | AttachError::Segment(_)) => Judgement::fail(
-            told(answer),
-            Remedy::words("name another socket with PHANTOM3_SOCKET, or end that program"),
-        ),
+        Err(AttachError::NotADriver { .. } | AttachError::HungUp { .. } | AttachError::Segment(_)) => {
+            Judgement::fail(
+                told(answer),
+                Remedy::words("name another socket with PHANTOM3_SOCKET, or end that program"),
+            )
+        }
     })
 }
 

@@ -60,6 +60,7 @@ fn look(devices: Vec<DeviceStatus>) -> Look {
         wait: "futex",
         cpu: Some(3),
         tick: Some(123_456),
+        silent_for_s: None,
         state: "active",
         fault: None,
         lease: 2,

@@ -2,6 +2,7 @@
 //! there are no threads, or the loop waits for somebody who has stopped.
 
 use bytemuck::Zeroable;
+use patience::prelude::*;
 use rustix::process::Signal;
 use shm_abi::{DriverState, FaultReason, Frame, client, stop_socket};
 use std::fs::File;
@@ -169,6 +170,36 @@ fn a_driver_whose_sockets_file_is_gone_is_found_however_its_path_is_written() {
             std::fs::remove_file(file.path()).expect("what it left");
         }
     }
+}
+
+/// Whoever looks out of a container sees nobody outside, and has another number there than here.
+#[test]
+fn a_driver_in_a_container_is_found_by_its_number_here_and_calls_nobody_process_0() {
+    let contained = |command: &str| {
+        let mut unshare = Command::new("unshare");
+        unshare.args(["--user", "--map-root-user", "--pid", "--fork", "--kill-child", command]);
+        unshare
+    };
+    if !contained("true").stderr(Stdio::null()).bounded_status().is_ok_and(|status| status.success()) {
+        println!("skipped: no namespaces here");
+        return;
+    }
+    let program = programs::io_driver();
+    let driver = Driver::start_as(&resting("real", 1), contained(&program.get_program().to_string_lossy()));
+    let _commander = driver.command_in_force();
+    let refusal = client::command(driver.socket(), "second").expect_err("it is commanded").to_string();
+    assert!(refusal.contains("commanded by a process of another PID namespace (test)"), "{refusal}");
+    let observer = driver.observe();
+    for file in [driver.socket().to_path_buf(), stop_socket::path_beside(driver.socket())] {
+        std::fs::rename(&file, file.with_extension("moved")).expect("its file");
+    }
+    let end = io_driver(&["emergency-stop"], driver.socket());
+    assert_eq!(end.status, Some(3), "{end:?}");
+    let number =
+        end.err.split("but process ").nth(1).and_then(|rest| rest.split(' ').next()?.parse::<u32>().ok());
+    let status =
+        std::fs::read_to_string(format!("/proc/{}/status", number.expect("it is named"))).expect("it lives");
+    assert!(status.contains(&format!("\t{}\n", observer.driver_pid)), "{status}");
 }
 
 /// A pipe that is full, and nobody drains it. Whoever drops its reading end breaks it.
