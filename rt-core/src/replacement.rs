@@ -288,6 +288,8 @@ fn create_draft(place: &Path, directory: &Path, mode: u32) -> io::Result<(File, 
 
 #[cfg(test)]
 mod tests {
+    use patience::prelude::*;
+
     use super::*;
     use std::io::Write;
     use std::os::unix::fs::PermissionsExt;
@@ -359,7 +361,7 @@ mod tests {
             assert_eq!(std::fs::read(&place).expect("there"), b"new");
             write(&place, "longer than before").expect("room");
         };
-        std::thread::scope(|scope| scope.spawn(write_as_nobody).join()).expect("no panic");
+        std::thread::scope(|scope| scope.spawn(write_as_nobody).bounded_join()).expect("no panic");
         assert_eq!(std::fs::read(&place).expect("there"), b"longer than before");
         assert_eq!(names(directory.path()), ["a"]);
         std::fs::set_permissions(directory.path(), Permissions::from_mode(0o755)).expect("our own");

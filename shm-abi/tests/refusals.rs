@@ -6,7 +6,7 @@ use common::fake::{fake_server, hear, send};
 use common::host::Host;
 use common::{directory, info};
 use patience::prelude::*;
-use patience::{limit, watched};
+use patience::{accepted, limit, watched};
 use shm_abi::client::{self, AttachError};
 use shm_abi::handshake::{Answer, Request, RequestKind, Verdict};
 use shm_abi::server::ServerEvent;
@@ -130,7 +130,7 @@ fn error_after_hanging_up(before_it_closes: fn(UnixListener, &Path) -> Option<Un
     let listener = UnixListener::bind(&socket).unwrap();
     let place = socket.clone();
     let server = std::thread::spawn(move || {
-        let (mut stream, _) = listener.accept().unwrap();
+        let mut stream = accepted(&listener);
         hear(&mut stream);
         before_it_closes(listener, &place)
     });
