@@ -7,22 +7,32 @@ use crate::common::meshes::{touchable, unit_vector};
 use crate::common::models::models;
 use crate::common::ugly;
 use crate::common::*;
-use crate::mesh_oracle::{closest, corners, winding_number};
+use crate::mesh_oracle::{closest, corners, distance, winding_number};
 use haptics::Friction;
 use haptics::mesh::Mesh;
 use nalgebra::Vector3;
 
-/// How far a finger would have to go at most to touch nothing \[m\]: by all faces, and the winding number beyond them.
-fn overlap_m(mesh: &Mesh, hip: &Vector3<f64>, radius_m: f64) -> f64 {
+/// How far a finger would have to go to touch nothing, at least \[m\]: outside of the mesh that is all.
+fn least_overlap_m(mesh: &Mesh, hip: &Vector3<f64>, radius_m: f64) -> f64 {
+    let nearest_m = distance(mesh, hip);
+    if is_inside(mesh, hip) { radius_m + nearest_m } else { (radius_m - nearest_m).max(0.0) }
+}
+
+/// The same at most: the nearest way that leads out, of those to all faces.
+fn most_overlap_m(mesh: &Mesh, hip: &Vector3<f64>, radius_m: f64) -> f64 {
+    if !is_inside(mesh, hip) {
+        return least_overlap_m(mesh, hip, radius_m);
+    }
     let feet = (0..mesh.faces().len()).map(|face| closest(&corners(mesh, face), hip));
     let mut ways: Vec<Vector3<f64>> = feet.map(|foot| foot - hip).collect();
     ways.sort_by(|a, b| a.norm_squared().total_cmp(&b.norm_squared()));
-    let is_inside = |p: &Vector3<f64>| winding_number(mesh, p) > 0.5;
-    if !is_inside(hip) {
-        return (radius_m - ways[0].norm()).max(0.0);
-    }
-    let beyond = |way: &&Vector3<f64>| !is_inside(&(hip + *way * (1.0 + 1e-9) + way.normalize() * 1e-9));
-    ways.iter().find(beyond).map_or(f64::INFINITY, Vector3::norm) + radius_m
+    let leads_out =
+        |way: &&Vector3<f64>| !is_inside(mesh, &(hip + *way * (1.0 + 1e-9) + way.normalize() * 1e-9));
+    ways.iter().find(leads_out).map_or(f64::INFINITY, Vector3::norm) + radius_m
+}
+
+fn is_inside(mesh: &Mesh, p: &Vector3<f64>) -> bool {
+    winding_number(mesh, p) > 0.5
 }
 
 /// A point of a face, most faces being small, and one near it.
@@ -41,17 +51,19 @@ fn begin_all_over(name: &str, mesh: &Arc<Mesh>, friction: Friction, radius_m: f6
     for start in 0..starts {
         let [on_it, mut hip] = near_a_face(mesh, &mut noise, 0.8e-3);
         let start_at = hip;
-        // At least; what it is in truth is looked for where it has to explain more.
         let mut explained_m = (radius_m - (hip - on_it).norm()).max(0.0);
-        let mut is_looked_for = false;
+        // Looked for where it has to explain more: what takes longer comes last.
+        let mut looks = [least_overlap_m, most_overlap_m].iter();
         let mut finger = finger(radius_m);
         let mut way_m = 0.0;
         for tick in 0..12 {
             let force_n = finger.step(from_ref(&entity), &hip, DT).force_on_user_W.norm();
             // What a ball takes for touching, many times over.
             let most_n = |overlap_m| K * (overlap_m + way_m) * (1.0 + 1e-9) + 1e-6;
-            if force_n > most_n(explained_m) && !is_looked_for {
-                (explained_m, is_looked_for) = (overlap_m(mesh, &start_at, radius_m), true);
+            while force_n > most_n(explained_m)
+                && let Some(look) = looks.next()
+            {
+                explained_m = look(mesh, &start_at, radius_m);
             }
             let most_n = most_n(explained_m);
             assert!(
