@@ -226,7 +226,7 @@ fn create_beside(place: &Path, rights: Option<&Permissions>) -> io::Result<(File
     }
 }
 
-/// Where nobody else may read it, whoever may read the place.
+/// A draft that nobody else may read, whoever may read the place.
 fn create_among_temporary_files(place: &Path, beside: &io::Error) -> io::Result<(File, PathBuf)> {
     create_draft(place, &std::env::temp_dir(), 0o600).map_err(|error| {
         io::Error::other(format!(

@@ -191,7 +191,7 @@ pub fn is_same_place(a: &Path, b: &Path) -> bool {
     }
 }
 
-/// Whether both are one name in one directory, which has two itself where it is mounted twice. Of what is there already
+/// True for one name in one directory, which has two itself where it is mounted twice. Of what is there already
 /// the file tells.
 fn is_one_name(a: &Path, b: &Path) -> bool {
     let is_free = || !a.exists() && !b.exists();

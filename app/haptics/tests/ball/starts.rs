@@ -12,7 +12,7 @@ use haptics::Friction;
 use haptics::mesh::Mesh;
 use nalgebra::Vector3;
 
-/// How far a finger would have to go to touch nothing, at least \[m\]: outside of the mesh that is all.
+/// Way that a finger would have to go to touch nothing, at least \[m\]: outside of the mesh that is all.
 fn least_overlap_m(mesh: &Mesh, hip: &Vector3<f64>, radius_m: f64) -> f64 {
     let nearest_m = distance(mesh, hip);
     if is_inside(mesh, hip) { radius_m + nearest_m } else { (radius_m - nearest_m).max(0.0) }
