@@ -275,7 +275,10 @@ fn newton(
         [true, true] => {
             let (det, plain) = (a * c - b * b, uu * vv - uv * uv);
             let least = LEAST_PIVOT * LEAST_PIVOT * uu * vv;
-            if a > LEAST_PIVOT * uu && det > LEAST_PIVOT * plain && det > least {
+            // Shares of the metric in two directions: their product and their sum, each times `plain`. The smaller one is
+            // above their quotient.
+            let sum = a * vv - 2.0 * b * uv + c * uu;
+            if a > LEAST_PIVOT * uu && det > LEAST_PIVOT * sum && det > least {
                 ([(slope[0] * c - slope[1] * b) / det, (slope[1] * a - slope[0] * b) / det], true)
             } else if plain > least {
                 ([(slope[0] * vv - slope[1] * uv) / plain, (slope[1] * uu - slope[0] * uv) / plain], false)

@@ -68,7 +68,7 @@ fn begin_all_over(name: &str, mesh: &Arc<Mesh>, friction: Friction, radius_m: f6
             let most_n = most_n(explained_m);
             assert!(
                 force_n <= most_n,
-                "{name}, {radius_m} m, start {start}, tick {tick} at {hip:?}: {force_n} N, explained {most_n} N"
+                "{name} of {seed}, {radius_m} m, start {start}, tick {tick} at {hip:?}: {force_n} N, explained {most_n} N"
             );
             let step = unit_vector(&mut noise) * (2e-4 * noise.uniform());
             way_m += step.norm();

@@ -3,7 +3,7 @@
 use crate::common::flawed::*;
 use crate::common::meshes::*;
 use crate::common::*;
-use crate::mesh_oracle::winding_number;
+use crate::mesh_oracle::{winding_number, winding_number_of_all};
 use haptics::Friction;
 use haptics::mesh::{CloseHoles, Mesh, MeshReport, Sides, TriangleSoup, make};
 use nalgebra::Vector3;
@@ -203,6 +203,10 @@ fn small_holes_of_what_is_nearly_closed_are_closed_and_a_cup_stays_open() {
     let (mesh, report) = build(cup.clone());
     assert_eq!((mesh.sides(), mesh.has_inside(), report.closed_holes.count), (Sides::Sheet, false, 0));
     assert!(report.to_string().contains("1 part not closed: felt from both sides"), "{report}");
+    // Its hollow is no inside, though the winding number says so by itself of any place in it: 0.9 in the middle.
+    let in_the_middle = winding_number_of_all(&mesh, &Vector3::zeros());
+    assert!((in_the_middle - 0.9).abs() < 0.02, "{in_the_middle}");
+    assert!(mesh.first_hit(&point(0.0, 0.2, 0.0), &point(0.0, -0.09, 0.0)).is_none());
     for (size_m, is_solid) in [(0.1, false), (0.2, true)] {
         let (mesh, report) = Mesh::build_closing(cup.clone(), CloseHoles::UpTo(size_m)).unwrap();
         assert_eq!(mesh.sides() == Sides::Solid, is_solid, "{report}");

@@ -67,14 +67,21 @@ pub(crate) fn first_fraction(mesh: &Mesh, from: &Vector3<f64>, to: &Vector3<f64>
     fractions.min_by(f64::total_cmp)
 }
 
-/// Winding number of the closed parts of a mesh around a point: 1 inside, 0 outside (van Oosterom & Strackee 1983).
+/// Winding number of the closed parts of a mesh around a point: 1 inside, 0 outside.
 pub(crate) fn winding_number(mesh: &Mesh, p: &Vector3<f64>) -> f64 {
-    let solid_angle = |face| {
-        let [a, b, c] = corners(mesh, face).map(|corner| corner - p);
-        let [la, lb, lc] = [a.norm(), b.norm(), c.norm()];
-        let below = la * lb * lc + a.dot(&b) * lc + b.dot(&c) * la + c.dot(&a) * lb;
-        2.0 * a.dot(&b.cross(&c)).atan2(below)
-    };
     let is_solid = |face: &usize| mesh.faces()[*face].sides == Sides::Solid;
-    (0..mesh.faces().len()).filter(is_solid).map(solid_angle).sum::<f64>() / (2.0 * TAU)
+    (0..mesh.faces().len()).filter(is_solid).map(|face| solid_angle(mesh, face, p)).sum::<f64>() / (2.0 * TAU)
+}
+
+/// The same of all faces, sheets too: what a place has of an inside, open though it may be.
+pub(crate) fn winding_number_of_all(mesh: &Mesh, p: &Vector3<f64>) -> f64 {
+    (0..mesh.faces().len()).map(|face| solid_angle(mesh, face, p)).sum::<f64>() / (2.0 * TAU)
+}
+
+/// Solid angle under which a face is seen (van Oosterom & Strackee 1983).
+fn solid_angle(mesh: &Mesh, face: usize, p: &Vector3<f64>) -> f64 {
+    let [a, b, c] = corners(mesh, face).map(|corner| corner - p);
+    let [la, lb, lc] = [a.norm(), b.norm(), c.norm()];
+    let below = la * lb * lc + a.dot(&b) * lc + b.dot(&c) * la + c.dot(&a) * lb;
+    2.0 * a.dot(&b.cross(&c)).atan2(below)
 }

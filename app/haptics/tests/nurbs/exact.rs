@@ -53,6 +53,20 @@ fn the_nearest_point_is_the_closed_forms() {
     }
 }
 
+/// All of the ball is almost equally far from there, and Newton's matrix almost nothing.
+#[test]
+fn near_the_middle_of_a_ball_the_nearest_point_is_the_closed_forms() {
+    let [(_, nurbs, form), ..] = &pairs()[..] else { panic!("a ball") };
+    let surface = nurbs.surface(0.0);
+    let mut noise = Noise(3);
+    for i in 0..2000 {
+        let p = noise.vector(1.0).normalize() * noise.between(1e-4, 2e-3);
+        let (here, there) = (surface.nearest(&p), form.nearest(&p));
+        let (a, b) = ((here.point_B - p).norm(), (there.point_B - p).norm());
+        assert!((a - b).abs() < 1e-13, "{i}: {p:?} {a} {b}");
+    }
+}
+
 /// Round the form, over poles and seams, between 2 mm off it and 4 mm deep: less than any radius of curvature, since
 /// deeper a god-object may choose its way out.
 fn path(i: u32, form: &Form, radius_m: f64) -> Vector3<f64> {
