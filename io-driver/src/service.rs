@@ -199,7 +199,7 @@ impl Recipient for Desk<'_> {
             }
             ServerEvent::Trouble { message } => say::say(format_args!("io-driver: {message}")),
             ServerEvent::StopRequested { pid } => {
-                self.stop = Some(format!("request of {}", ProcessWords(pid)))
+                self.stop = Some(format!("request of {}", ProcessWords(pid)));
             }
         }
         Ok(())
