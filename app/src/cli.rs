@@ -117,6 +117,11 @@ pub fn main() -> ExitCode {
 
 fn execute() -> ExitCode {
     let Cli { settings, command, headless } = arguments::parse_with(advise);
+    if settings.is_said() && !obeys_settings(command.as_ref()) {
+        return failed(&RunFailure::Start(
+            "--set, --settings: for run, play, check SCENE, replay and settings alone; this command goes by none".into(),
+        ));
+    }
     match command {
         Some(AppCommand::Driver(command)) => io_driver::cli::execute(command),
         Some(AppCommand::Calibrate(args)) => calibrate::run(&args),
@@ -146,7 +151,8 @@ fn execute() -> ExitCode {
             .map_or_else(|failure| failed(&failure), |settings| check::execute(&args, &settings)),
         Some(AppCommand::Convert(args)) => conclude_or_take_back(|| convert::execute(&args)),
         Some(AppCommand::Replay(args)) => {
-            let result = install_signals().and_then(|signals| replay::execute(&args, &signals));
+            let ready = settings.load().and_then(|settings| Ok((settings, install_signals()?)));
+            let result = ready.and_then(|(settings, signals)| replay::execute(&args, &settings, &signals));
             result.unwrap_or_else(|failure| failed(&failure))
         }
         Some(AppCommand::Export(args)) => conclude_or_take_back(|| export::execute(&args)),
@@ -156,6 +162,18 @@ fn execute() -> ExitCode {
             result.map_or_else(|failure| failed(&failure), Stop::conclude)
         }
         None => conclude(settings.load().and_then(|settings| play_or_demo(&settings, headless))),
+    }
+}
+
+/// True for a command to which settings say something.
+fn obeys_settings(command: Option<&AppCommand>) -> bool {
+    match command {
+        None => true,
+        Some(AppCommand::Check(args)) => !args.is_model(),
+        Some(command) => matches!(
+            command,
+            AppCommand::Run(_) | AppCommand::Play(_) | AppCommand::Replay(_) | AppCommand::Settings
+        ),
     }
 }
 

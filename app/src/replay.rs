@@ -25,6 +25,7 @@ use crate::record::{self, About, Recorder, View};
 use crate::rig::Rig;
 use crate::row_queue::{RowReceiver, row_queue};
 use crate::run::EVENT_QUEUE;
+use crate::settings;
 use crate::slow;
 use crate::virtual_clock::VirtualDriver;
 use clap::Args;
@@ -42,6 +43,7 @@ use std::fmt::Display;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use world::Settings;
 use world::events::{Hub, event_queue};
 
 /// Of `--expect-same`, when something differs.
@@ -74,11 +76,17 @@ pub struct ReplayArgs {
 ///
 /// # Errors
 /// A recording or a scene that cannot be read or is wrong, or a fault while it is played.
-pub fn execute(args: &ReplayArgs, signals: &StopSignals) -> Result<ExitCode, RunFailure> {
+pub fn execute(
+    args: &ReplayArgs,
+    settings: &Settings,
+    signals: &StopSignals,
+) -> Result<ExitCode, RunFailure> {
     let recorded = RecordedRun::open(&args.recording).map_err(|error| wrong(&error))?;
     refuse_without_beginning(args, &recorded)?;
     let edits: Vec<Edit> = args.friction.iter().chain(&args.change).cloned().collect();
-    let mut stage = Stage::set(&args.recording, &recorded, args.scene.as_deref(), &edits)?;
+    let scene = args.scene.as_ref().map(|scene| settings::find(scene, &settings.scenes.value));
+    let other = scene.as_deref().map(|scene| (scene, settings));
+    let mut stage = Stage::set(&args.recording, &recorded, other, &edits)?;
     check_outputs(args, &stage.rig)?;
     let played_from = args.recording.file_name().unwrap_or_default().to_string_lossy();
     stage.about.tell("replay_of", played_from.into_owned());

@@ -25,6 +25,11 @@ const SYSTEM_FILE: &str = "/etc/phantom3/settings.toml";
 const VARIABLE: &str = "PHANTOM3_SETTINGS";
 
 impl SettingsArgs {
+    /// Something is said on the command line.
+    pub fn is_said(&self) -> bool {
+        self.settings.is_some() || !self.set.is_empty()
+    }
+
     /// The settings that hold.
     ///
     /// # Errors

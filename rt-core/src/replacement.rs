@@ -13,9 +13,9 @@
 use crate::{limits, output_file};
 use nix::errno::Errno;
 use nix::fcntl::{FallocateFlags, fallocate};
-use std::fs::{File, OpenOptions, Permissions};
-use std::io;
-use std::os::unix::fs::OpenOptionsExt;
+use std::fs::{File, Metadata, OpenOptions, Permissions};
+use std::io::{self, Seek};
+use std::os::unix::fs::{MetadataExt, OpenOptionsExt};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Mutex, MutexGuard, PoisonError};
@@ -131,7 +131,7 @@ impl Replacement {
         let Some(draft) = self.draft.take() else { return Ok(()) };
         let mut all = unfinished();
         let moved = match &self.former {
-            Some(former) if self.is_far => copy_over(former, &draft),
+            Some(former) if self.is_far => copy_over(former, &self.file, &draft, &self.place),
             _ => self.claim_newcomer().and_then(|_newcomer| std::fs::rename(&draft, &self.place)),
         };
         let is_of_use = moved.as_ref().is_err_and(is_torn);
@@ -236,9 +236,10 @@ fn create_among_temporary_files(place: &Path, beside: &io::Error) -> io::Result<
     })
 }
 
-/// Puts the draft's content in the place of the former one, once there is room for all of it.
-fn copy_over(mut former: &File, draft: &Path) -> io::Result<()> {
-    let mut content = File::open(draft)?;
+/// Puts the content of the draft, whatever lies under its name by now, in the place of the former one, once there is room
+/// for all of it.
+fn copy_over(mut former: &File, mut content: &File, draft: &Path, place: &Path) -> io::Result<()> {
+    refuse_if_displaced(former, place)?;
     let bytes = content.metadata()?.len();
     if limits::largest_file().is_some_and(|most| bytes > most) {
         return Err(Errno::EFBIG.into());
@@ -250,8 +251,21 @@ fn copy_over(mut former: &File, draft: &Path) -> io::Result<()> {
         return Err(full.into());
     }
     former.set_len(former.metadata()?.len().min(bytes))?;
-    let copied = io::copy(&mut content, &mut former);
-    copied.map(drop).map_err(|source| io::Error::other(Torn { source, draft: draft.into() }))
+    content.rewind()?;
+    let copied = io::copy(&mut content, &mut former).and_then(|_| refuse_if_displaced(former, place));
+    copied.map_err(|source| io::Error::other(Torn { source, draft: draft.into() }))
+}
+
+/// Nobody finds what is written to a file that has lost its name.
+fn refuse_if_displaced(file: &File, place: &Path) -> io::Result<()> {
+    let identity = |found: Metadata| (found.dev(), found.ino());
+    let is_there = place
+        .metadata()
+        .is_ok_and(|found| file.metadata().is_ok_and(|open| identity(open) == identity(found)));
+    if is_there {
+        return Ok(());
+    }
+    Err(io::Error::other("it was removed meanwhile, or another file put in its place"))
 }
 
 /// Why a place has half of the new file.
@@ -278,7 +292,7 @@ fn create_draft(place: &Path, directory: &Path, mode: u32) -> io::Result<(File, 
         hidden.push(if name.len() < 200 { name } else { "result".as_ref() });
         hidden.push(format!(".{}-{count}.part", std::process::id()));
         let draft = directory.join(hidden);
-        match OpenOptions::new().write(true).create_new(true).mode(mode).open(&draft) {
+        match OpenOptions::new().read(true).write(true).create_new(true).mode(mode).open(&draft) {
             // Left by another process of this number.
             Err(error) if error.kind() == io::ErrorKind::AlreadyExists => {}
             made => return made.map(|file| (file, draft)),
@@ -360,11 +374,28 @@ mod tests {
             write(&place, "new").expect("room");
             assert_eq!(std::fs::read(&place).expect("there"), b"new");
             write(&place, "longer than before").expect("room");
+            // Somebody takes the draft's name, and somebody the place's.
+            let begun = Replacement::begin(&place).expect("begun");
+            begun.file().and_then(|mut file| file.write_all(b"mine")).expect("room");
+            let draft = begun.draft.clone().expect("a draft");
+            std::fs::rename(&draft, draft.with_extension("taken")).expect("our own");
+            std::fs::write(&draft, "another's").expect("room");
+            begun.keep().expect("kept");
+            assert_eq!(std::fs::read(&place).expect("there"), b"mine");
+            std::fs::remove_file(draft.with_extension("taken")).expect("our own");
+            Replacement::begin(&place).expect("begun")
         };
-        std::thread::scope(|scope| scope.spawn(write_as_nobody).bounded_join()).expect("no panic");
-        assert_eq!(std::fs::read(&place).expect("there"), b"longer than before");
-        assert_eq!(names(directory.path()), ["a"]);
+        let begun =
+            std::thread::scope(|scope| scope.spawn(write_as_nobody).bounded_join()).expect("no panic");
         std::fs::set_permissions(directory.path(), Permissions::from_mode(0o755)).expect("our own");
+        std::fs::rename(&place, directory.path().join("b")).expect("our own");
+        for newcomer in [None, Some("another's")] {
+            newcomer.map_or(Ok(()), |text| std::fs::write(&place, text)).expect("room");
+            assert!(refuse_if_displaced(begun.former.as_ref().expect("it was there"), &place).is_err());
+        }
+        begun.keep().expect_err("it has lost its name");
+        assert_eq!(std::fs::read(&place).expect("there"), b"another's");
+        assert_eq!(names(directory.path()), ["a", "b"]);
     }
 
     #[test]

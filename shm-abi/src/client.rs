@@ -5,7 +5,7 @@
 
 use crate::handshake::{self, Answer, Request, RequestKind, Verdict};
 use crate::layout::{LAYOUT_HASH, MAGIC};
-use crate::peer::ProcessWords;
+use crate::peer::{Peer, ProcessWords};
 use crate::segment::{self, CommanderMemory, DriverView, SegmentError};
 use crate::socket;
 use crate::stop_socket;
@@ -213,6 +213,12 @@ pub fn clear_fault(socket: &Path, name: &str) -> Result<(), AttachError> {
     exchange(socket, &Request::new(RequestKind::ClearFault, name)).map(|_| ())
 }
 
+/// The same for somebody who asked at `asked_ns` (CLOCK_MONOTONIC), whatever went by since: no stop after that is undone.
+pub fn clear_fault_as_of(asked_ns: u64, socket: &Path, name: &str) -> Result<(), AttachError> {
+    let request = Request { asked_ns, ..Request::new(RequestKind::ClearFault, name) };
+    exchange(socket, &request).map(|_| ())
+}
+
 /// Asks the driver to switch all motors off at once: by datagram, which a driver hears whose service is stuck, else over
 /// a connection. They stay off until [`clear_fault`]. That it was asked does not say that it was done: a frame tells,
 /// and a fault that is to be left is to be waited for first.
@@ -278,10 +284,20 @@ fn exchange(socket: &Path, request: &Request) -> Result<(Answer, Vec<OwnedFd>, O
         Err(error) if error.kind() != io::ErrorKind::BrokenPipe => return Err(talk_error(socket, error)),
         _ => {}
     }
-    let (answer, fds) = socket::receive::<Answer>(connection.as_fd(), ANSWER_TIMEOUT)
+    let (mut answer, fds) = socket::receive::<Answer>(connection.as_fd(), ANSWER_TIMEOUT)
         .map_err(|error| talk_error(socket, error))?;
+    number_as_here(&mut answer, &connection);
     judge(socket, request, &answer)?;
     Ok((answer, fds, connection))
+}
+
+/// A driver in a container tells numbers of processes that mean others here, or nobody; the kernel knows its own here.
+fn number_as_here(answer: &mut Answer, connection: &OwnedFd) {
+    let Ok(listener) = Peer::of(connection.as_fd()) else { return };
+    if u64::from(listener.pid) != answer.driver_pid {
+        answer.driver_pid = u64::from(listener.pid);
+        answer.holder_pid = 0;
+    }
 }
 
 /// Turns an answer into our error. The driver's own words are compared here too: it may be the older one

@@ -42,7 +42,7 @@ impl Peer {
     }
 }
 
-/// Number of a process in words; 0 is what the kernel tells of one in a PID namespace that the asker does not see.
+/// Number of a process in words; 0: that of one in another PID namespace is not known here.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct ProcessWords(pub u64);
 

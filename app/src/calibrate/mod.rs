@@ -5,7 +5,7 @@
 //! Output: what programs want (the layout, with `--json` the result) on standard output, what people want on standard
 //! error.
 //!
-//! Exit status: 0 done; 2 bad usage or bad input, and pairs that determine nothing; 3 the driver went away meanwhile.
+//! Exit status: 0 done; 2 bad usage or bad input, and pairs that determine nothing; 3 the driver went away meanwhile, or pairs were not saved.
 
 #![allow(non_snake_case)] // Frames are capital letters: X_WF takes F to W.
 
@@ -44,7 +44,7 @@ Without --write the new layout goes to standard output.\n\n\
   phantom3 calibrate --live --device 1 --write        hold the end points together, follow the words, done\n  \
 phantom3 calibrate --pairs pairs.csv --plot residuals.svg\n  \
 phantom3 run SCENE.toml --attach                    uses what --write wrote\n\n\
-Exit status: 0 done; 2 bad usage, bad input, or pairs that determine nothing; 3 the driver went away.";
+Exit status: 0 done; 2 bad usage, bad input, or pairs that determine nothing; 3 the driver went away, or pairs were not saved.";
 
 /// Arguments of `calibrate`.
 #[derive(Debug, Args)]
@@ -206,6 +206,14 @@ pub enum CalibrateFailure {
         /// Of the figure.
         failure: Box<CalibrateFailure>,
     },
+    /// The result is told, and something beside it was lost.
+    #[error("{0}; all else is done")]
+    AllElse(Box<CalibrateFailure>),
+    /// Pairs would take the place of something else.
+    #[error(
+        "--save-pairs {}: found a file that holds no pairs; name another one, or move it away", .0.display()
+    )]
+    NotPairs(PathBuf),
     /// Signals cannot be caught.
     #[error("cannot catch signals: {0}")]
     Signals(io::Error),
@@ -217,15 +225,22 @@ pub fn run(args: &CalibrateArgs) -> ExitCode {
         Ok(()) => ExitCode::SUCCESS,
         Err(failure) => {
             say(format_args!("phantom3 calibrate: {failure}"));
-            let is_fault = matches!(&failure, CalibrateFailure::Live(error) if error.is_fault());
+            let is_fault = match &failure {
+                CalibrateFailure::Live(error) => error.is_fault(),
+                failure => matches!(failure, CalibrateFailure::AllElse(_)),
+            };
             ExitCode::from(if is_fault { 3 } else { 2 })
         }
     }
 }
 
 fn run_to_end(args: &CalibrateArgs) -> Result<(), CalibrateFailure> {
-    let plan = Plan::check(args)?;
-    let (origin, pairs) = get_pairs(args)?;
+    let mut plan = Plan::check(args)?;
+    let (origin, pairs, unsaved) = get_pairs(args)?;
+    if args.pairs.is_none() {
+        // Others may have edited it since: devices are gathered at for minutes.
+        plan.read_layout()?;
+    }
     let model = if args.affine { Model::Affine } else { Model::Rigid };
     let found = calibrate(&pairs, model)
         .map_err(|source| CalibrateFailure::Fit { origin: origin.clone(), source })?;
@@ -257,7 +272,8 @@ fn run_to_end(args: &CalibrateArgs) -> Result<(), CalibrateFailure> {
     drawn.map_err(|failure| match plan.write {
         Some(layout) => CalibrateFailure::OnlyWritten { layout, failure: Box::new(failure) },
         None => failure,
-    })
+    })?;
+    unsaved.map_or(Ok(()), |failure| Err(CalibrateFailure::AllElse(Box::new(failure))))
 }
 
 /// What can be checked before anybody moves a device.
@@ -291,16 +307,25 @@ impl Plan {
         {
             return Err(LayoutFileError::WouldReplace { file: edited.clone(), given: given.clone() }.into());
         }
-        let base_file = args.layout.as_ref().or(edited).cloned();
-        let base = base_file.as_deref().map(layout_file::read).transpose()?.unwrap_or_default();
-        let layout = Layout::parse(&base, base_file.as_deref().unwrap_or(Path::new("layout")))?;
-        let plan = Self { write, base, base_file, layout };
+        let base_file = args.layout.clone();
+        let mut plan = Self { write, base: String::new(), base_file, layout: Layout::default() };
+        plan.read_layout()?;
         if plan.layout.master() == Some(args.device) {
             let file = plan.base_name().into();
             let (device, fiducial) = (args.device, args.fiducial);
             return Err(CalibrateFailure::DeviceIsMaster { file, device, fiducial });
         }
         Ok(plan)
+    }
+
+    /// The layout as it is now; one that is edited may be there only since a moment.
+    fn read_layout(&mut self) -> Result<(), CalibrateFailure> {
+        if self.base_file.is_none() {
+            self.base_file = self.write.clone().filter(|file| file.exists());
+        }
+        self.base = self.base_file.as_deref().map(layout_file::read).transpose()?.unwrap_or_default();
+        self.layout = Layout::parse(&self.base, self.base_file.as_deref().unwrap_or(Path::new("layout")))?;
+        Ok(())
     }
 
     fn base_name(&self) -> &Path {
@@ -335,14 +360,16 @@ fn refuse_streams(args: &CalibrateArgs, write: Option<&Path>) -> Result<(), Cali
     outputs::check_streams(&outputs.collect::<Vec<_>>(), &inputs).map_err(CalibrateFailure::Stream)
 }
 
-/// The pairs, and where they come from in words.
-fn get_pairs(args: &CalibrateArgs) -> Result<(String, Vec<Pair>), CalibrateFailure> {
+/// The pairs, where they come from in words, and why they are not saved.
+type Got = (String, Vec<Pair>, Option<CalibrateFailure>);
+
+fn get_pairs(args: &CalibrateArgs) -> Result<Got, CalibrateFailure> {
     if let Some(file) = &args.pairs {
         let text =
             read_pairs(file).map_err(|source| CalibrateFailure::Unreadable { file: file.clone(), source })?;
         let pairs =
             parse_pairs(&text).map_err(|source| CalibrateFailure::Pairs { file: file.clone(), source })?;
-        return Ok((file.display().to_string(), pairs));
+        return Ok((file.display().to_string(), pairs, None));
     }
     let signals = StopSignals::install().map_err(CalibrateFailure::Signals)?;
     let socket = args.live.as_ref().filter(|socket| !socket.as_os_str().is_empty());
@@ -355,13 +382,17 @@ fn get_pairs(args: &CalibrateArgs) -> Result<(String, Vec<Pair>), CalibrateFailu
     // Found out now, not after a minute of holding two arms together.
     args.save_pairs.as_ref().map_or(Ok(()), |file| refuse_unwritable(file))?;
     let gathered = live::gather(&wish, &signals);
+    // Too few take the place of none that are there.
+    let is_worth = |file: &&PathBuf| gathered.pairs.len() >= FEWEST_PAIRS || !file.exists();
     let has_result = gathered.end.is_ok() || !gathered.pairs.is_empty();
-    if let Some(file) = args.save_pairs.as_ref().filter(|_| has_result) {
-        save_pairs(file, &gathered.pairs)?;
-    }
+    let file = args.save_pairs.as_ref().filter(|_| has_result).filter(is_worth);
+    let saved = file.map_or(Ok(()), |file| save_pairs(file, &gathered.pairs));
     gathered.end?;
-    Ok((wish.socket.display().to_string(), gathered.pairs))
+    Ok((wish.socket.display().to_string(), gathered.pairs, saved.err()))
 }
+
+/// What a rigid transform takes.
+const FEWEST_PAIRS: usize = 3;
 
 /// Pipes that somebody writes are welcome; what never begins or never ends is not.
 fn read_pairs(file: &Path) -> io::Result<String> {
@@ -372,15 +403,21 @@ fn read_pairs(file: &Path) -> io::Result<String> {
 /// Room for as many pairs as there may be, with all their digits.
 const MAX_PAIRS_BYTES: u64 = 256 << 20;
 
-/// Earlier pairs stay until there are others.
+/// Earlier pairs stay until there are others, and everything else stays.
 fn refuse_unwritable(file: &Path) -> Result<(), CalibrateFailure> {
+    let is_table = |file: &Path| file.metadata().is_ok_and(|found| found.is_file() && found.len() > 0);
+    if is_table(file)
+        && !read_pairs(file).is_ok_and(|text| parse_pairs(&text).is_ok() || text.trim_end() == HEADER)
+    {
+        return Err(CalibrateFailure::NotPairs(file.into()));
+    }
     let begun = Replacement::begin(file).map(drop);
     begun.map_err(|source| CalibrateFailure::Output { file: file.into(), source })
 }
 
 /// Numbers as short as they can be read back exactly.
 fn save_pairs(file: &Path, pairs: &[Pair]) -> Result<(), CalibrateFailure> {
-    let mut text = String::from("fiducial_x_m,fiducial_y_m,fiducial_z_m,other_x_m,other_y_m,other_z_m\n");
+    let mut text = format!("{HEADER}\n");
     for pair in pairs {
         let numbers: Vec<String> =
             pair.fiducial.iter().chain(pair.other.iter()).map(|number| format!("{number:?}")).collect();
@@ -389,6 +426,8 @@ fn save_pairs(file: &Path, pairs: &[Pair]) -> Result<(), CalibrateFailure> {
     }
     replacement::write(file, text).map_err(|source| CalibrateFailure::Output { file: file.into(), source })
 }
+
+const HEADER: &str = "fiducial_x_m,fiducial_y_m,fiducial_z_m,other_x_m,other_y_m,other_z_m";
 
 fn refuse_spoilt(found: &Calibration, origin: &str) -> Result<(), CalibrateFailure> {
     let Some(source) = found.all_refused.clone() else { return Ok(()) };

@@ -5,12 +5,13 @@ use crate::outcome::RunFailure;
 use crate::record::read::RecordedRun;
 use crate::record::{About, InputFile};
 use crate::rig::{HandMode, Rig};
+use crate::settings;
 use rt_core::input_file;
 use shm_abi::segment::ClockMode;
 use std::path::{Path, PathBuf};
 use tempfile::TempDir;
 use toml_edit::DocumentMut;
-use world::{MAX_FILE_BYTES, Scene, ShapeSpec};
+use world::{MAX_FILE_BYTES, Scene, Settings, ShapeSpec};
 
 /// A scene that is ready to be played to.
 pub(super) struct Stage {
@@ -26,15 +27,15 @@ pub(super) struct Stage {
 }
 
 impl Stage {
-    /// The recording's own scene, or `other`, changed by these edits.
+    /// The recording's own scene, or `other` with its data where settings say, changed by these edits.
     pub(super) fn set(
         recording: &Path,
         recorded: &RecordedRun,
-        other: Option<&Path>,
+        other: Option<(&Path, &Settings)>,
         edits: &[Edit],
     ) -> Result<Self, RunFailure> {
         let (file, text) = match other {
-            Some(file) => (file.to_path_buf(), read(file)?),
+            Some((file, _)) => (file.to_path_buf(), read(file)?),
             None => attached_scene(recording, recorded)?,
         };
         let original = text.clone();
@@ -43,6 +44,9 @@ impl Stage {
             Ok(_) => wrong(&format_args!("{} (a line of the scene as changed: {})", error, list(edits))),
             Err(error) => wrong(&error),
         })?;
+        if let Some((file, settings)) = other {
+            settings::find_data(&mut scene, file, settings);
+        }
         let its_hand = scene.hand.take().filter(|_| other.is_some());
         let directory = match recorded.about() {
             Some(about) if other.is_none() => unpack_models(&mut scene, about)?,
@@ -52,7 +56,7 @@ impl Stage {
             .map_err(|error| wrong(&error))?;
         rig.scene.hand = its_hand;
         let mut name = match other {
-            Some(file) => file.display().to_string(),
+            Some((file, _)) => file.display().to_string(),
             None => format!("the recording's own, {}", file.display()),
         };
         if !edits.is_empty() {

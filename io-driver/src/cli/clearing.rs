@@ -7,6 +7,7 @@
 use super::{EXIT_FAULT, fail_to_ask};
 use crate::print::print_line;
 use crate::say::say;
+use rt_core::clock::monotonic_ns;
 use shm_abi::client;
 use shm_abi::{DriverState, DriverView, FaultReason, Frame};
 use std::path::Path;
@@ -21,9 +22,11 @@ const NAME: &str = "io-driver";
 
 /// Asks, and says what became of it.
 pub(super) fn clear_fault(socket: &Path) -> ExitCode {
+    // Whoever asks knows of no stop that comes while a place to look from is waited for.
+    let asked_ns = monotonic_ns();
     let observer = client::observe(socket, NAME);
     let before = observer.as_ref().ok().and_then(|observer| observer.driver.read_latest());
-    if let Err(error) = client::clear_fault(socket, NAME) {
+    if let Err(error) = client::clear_fault_as_of(asked_ns, socket, NAME) {
         return fail_to_ask(&error);
     }
     let failed = |why: std::fmt::Arguments<'_>| {

@@ -2,7 +2,8 @@
 //!
 //! Model: whose lease it was is what the frame before the request tells; with none there is nothing to end, which is
 //! said, since whoever asks wants somebody's force away. Asked, then believed only when a new frame is of another lease or of
-//! none. Whoever gets no place to look from is told so.
+//! none.
+//! Invariant: no exit status of 0 without such a frame.
 
 use super::clearing::{LOOK, PROMPT};
 use super::{EXIT_FAULT, fail_to_ask};
@@ -24,24 +25,29 @@ pub(super) fn end_lease(socket: &Path) -> ExitCode {
     }
     let said = match (&observer, before) {
         (_, Ok(Some(frame))) if frame.lease == 0 => "nobody commanded the devices".into(),
-        (Ok(observer), Ok(Some(frame))) => {
-            if !has_ended(&observer.driver, frame.lease) {
-                say(format_args!(
-                    "io-driver: lease {} was asked to end, and no new frame shows that it did: its force may still be on; next: \
-                     io-driver emergency-stop",
-                    frame.lease
-                ));
-                return ExitCode::from(EXIT_FAULT);
-            }
+        (Ok(observer), Ok(Some(frame))) if has_ended(&observer.driver, frame.lease) => {
             format!("lease {} is ended; its force ramps out", frame.lease)
         }
-        (Err(error), _) | (_, Err(error)) => {
-            format!("the lease is ended, if there was one; whose it was cannot be seen: {error}")
+        (Ok(_), Ok(Some(frame))) => {
+            let lease = frame.lease;
+            return unseen(format_args!(
+                "lease {lease} was asked to end, and no new frame shows that it did"
+            ));
         }
-        _ => "the lease is ended, if there was one: the driver has told no frame".to_owned(),
+        (Err(error), _) | (_, Err(error)) => {
+            return unseen(format_args!(
+                "the lease was asked to end, and what became of it cannot be seen: {error}"
+            ));
+        }
+        _ => return unseen(format_args!("the lease was asked to end, and the driver has told no frame")),
     };
     print_line(&said);
     ExitCode::SUCCESS
+}
+
+fn unseen(what: std::fmt::Arguments<'_>) -> ExitCode {
+    say(format_args!("io-driver: {what}: its force may still be on; next: io-driver emergency-stop"));
+    ExitCode::from(EXIT_FAULT)
 }
 
 /// True once a frame is of another lease, or of none, if one comes in time: the loop takes note with its next tick.

@@ -148,7 +148,7 @@ fn a_fault_is_not_left_because_somebody_asked_long_ago() {
     let observer = driver.observe();
     signal(&driver, Signal::STOP);
     let late = asked(&driver, "clear-fault");
-    assert_eq!(late.status, Some(2), "{late:?}");
+    assert_eq!(late.status, Some(3), "{late:?}");
     let before = observer.driver.latest_tick().expect("frames");
     signal(&driver, Signal::CONT);
     // The service hears the request within its next turn, which is 20 ms.

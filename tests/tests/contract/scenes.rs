@@ -621,6 +621,17 @@ fn settings_are_layered_and_say_where_data_is() {
     assert!(said.out.starts_with("clock        virtual"), "{}", said.out);
     let said = place.run(["run", "s.toml"]);
     assert_eq!(said.status, Some(2), "without the settings the scene is not found");
+    // A table is played again in that scene; what goes by no settings takes none.
+    let said = place.run(["run", "s.toml", "--settings", "p.toml", "--record", "r.csv"]);
+    assert_eq!(said.status, Some(0), "{}", said.err);
+    let replay = ["replay", "r.csv", "--expect-same", "--scene", "s.toml"];
+    let said = place.run(replay.iter().chain(&["--settings", "p.toml"]));
+    assert_eq!(said.status, Some(0), "{}", said.err);
+    assert_eq!(place.run(replay).status, Some(2), "without the settings the scene is not found");
+    let said = place.run(replay.iter().chain(&["--set", "entity.cube.mass_kg=1"]));
+    assert!(said.status == Some(2) && said.err.contains("--set:1: entity: unknown key"), "{}", said.err);
+    let said = place.run(["plot", "r.csv", "--set", "window.shadows=true"]);
+    assert!(said.status == Some(2) && said.err.contains("this command goes by none"), "{}", said.err);
     let said = place.run(["--settings", "none.toml", "settings"]);
     assert_eq!(
         (said.status, said.err.as_str()),

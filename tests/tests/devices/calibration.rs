@@ -364,8 +364,15 @@ fn a_live_calibration_makes_two_devices_meet_in_one_world() {
     place.write("in.toml", format!("[[device]]\n{}", entry(&truth()[0], "")));
     std::fs::create_dir_all(place.path("config/phantom3")).expect("a directory");
     std::fs::copy(place.path("in.toml"), place.path("config/phantom3/layout.toml")).expect("a copy");
-    let said = Running::start(live(&place, &driver, &["--save-pairs", "pairs.csv", "--write"])).wait();
+    let gathering = Running::start(live(&place, &driver, &["--save-pairs", "pairs.csv", "--write"]));
+    patience::until("it gathers", || gathering.said_so_far().contains("pairs"));
+    // Somebody edits the layout meanwhile.
+    let edited = std::fs::read_to_string(place.path("config/phantom3/layout.toml")).expect("there");
+    place.write("config/phantom3/layout.toml", format!("# mine\n{edited}"));
+    let said = gathering.wait();
     done(&said);
+    let written = std::fs::read_to_string(place.path("config/phantom3/layout.toml")).expect("there");
+    assert!(written.starts_with("# mine\n"), "{written}");
     for words in ["hold the end points of arm0 and arm1 together", "somebody commands", "move"] {
         assert!(said.err.contains(words), "{words}: {}", said.err);
     }
@@ -378,6 +385,20 @@ fn a_live_calibration_makes_two_devices_meet_in_one_world() {
     let again = place.run(["calibrate", "--pairs", "pairs.csv", "--layout", "in.toml"]);
     done(&again);
     assert_eq!(parse(&again.out).placement(1), layout.placement(1));
+
+    // Pairs that cannot be saved cost nothing else.
+    std::fs::create_dir(place.path("gone")).expect("a directory");
+    let arguments = ["--seconds", "4", "--save-pairs", "gone/pairs.csv", "--layout", "in.toml"];
+    let gathering = Running::start(live(&place, &driver, &arguments));
+    patience::until("it gathers", || gathering.said_so_far().contains("pairs"));
+    std::fs::remove_dir_all(place.path("gone")).expect("our own");
+    let unsaved = gathering.wait();
+    assert_eq!(unsaved.status, Some(3), "{unsaved:?}");
+    assert!(
+        unsaved.err.contains("cannot be written") && unsaved.err.contains("all else is done"),
+        "{unsaved:?}"
+    );
+    assert_stands(&parse(&unsaved.out), 1, &truth()[1]);
 
     signal(&commander, Signal::INT);
     commander.wait();
@@ -462,6 +483,18 @@ fn devices_that_nobody_moves_or_that_are_not_there_are_refused() {
         let said = Running::start(live(&place, &driver, arguments)).wait();
         assert_eq!((said.status, said.out.as_str()), (Some(2), ""), "{said:?}");
         assert!(said.err.contains(words), "{words}: {}", said.err);
+    }
+    // What is there stays: of another kind for good, pairs for lack of others.
+    let pairs = "fiducial_x_m,fiducial_y_m,fiducial_z_m,other_x_m,other_y_m,other_z_m\n0,0,0,1,1,1\n";
+    for (file, text, words) in [
+        ("table.csv", "tick,t\n1,0.001\n", "found a file that holds no pairs"),
+        ("pairs.csv", pairs, "found 1 pairs"),
+    ] {
+        place.write(file, text);
+        let arguments = ["--seconds", "0.5", "--save-pairs", file];
+        let said = Running::start(live(&place, &driver, &arguments)).wait();
+        assert!(said.status == Some(2) && said.err.contains(words), "{said:?}");
+        assert_eq!(std::fs::read_to_string(place.path(file)).expect("there"), text);
     }
 }
 

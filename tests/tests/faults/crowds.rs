@@ -86,8 +86,8 @@ fn with_every_place_taken_the_motors_are_stopped_all_the_same() {
     client::clear_fault(&stand.socket(), "test").expect("it is served");
     wait_for_state(&stand, false);
     let ended = io_driver(&["end-lease"], &stand.socket());
-    assert_eq!(ended.status, Some(0), "{ended:?}");
-    assert!(ended.out.contains("whose it was cannot be seen: "), "{ended:?}");
+    assert_eq!(ended.status, Some(3), "{ended:?}");
+    assert!(ended.err.contains("what became of it cannot be seen: "), "{ended:?}");
     drop((silent, crowd, commander));
     stand.finish();
 }

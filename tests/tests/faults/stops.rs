@@ -189,17 +189,38 @@ fn a_driver_in_a_container_is_found_by_its_number_here_and_calls_nobody_process_
     let _commander = driver.command_in_force();
     let refusal = client::command(driver.socket(), "second").expect_err("it is commanded").to_string();
     assert!(refusal.contains("commanded by a process of another PID namespace (test)"), "{refusal}");
-    let observer = driver.observe();
+    let told = driver.observe().driver_pid;
     for file in [driver.socket().to_path_buf(), stop_socket::path_beside(driver.socket())] {
         std::fs::rename(&file, file.with_extension("moved")).expect("its file");
     }
     let end = io_driver(&["emergency-stop"], driver.socket());
     assert_eq!(end.status, Some(3), "{end:?}");
-    let number =
-        end.err.split("but process ").nth(1).and_then(|rest| rest.split(' ').next()?.parse::<u32>().ok());
-    let status =
-        std::fs::read_to_string(format!("/proc/{}/status", number.expect("it is named"))).expect("it lives");
-    assert!(status.contains(&format!("\t{}\n", observer.driver_pid)), "{status}");
+    let number = end.err.split("but process ").nth(1).and_then(|rest| rest.split(' ').next()?.parse().ok());
+    assert_eq!(number, Some(told), "{end:?}");
+    let status = std::fs::read_to_string(format!("/proc/{told}/status")).expect("it lives here");
+    assert!(status.contains(&format!("\nNSpid:\t{told}\t")), "{status}");
+}
+
+#[test]
+fn leaving_a_fault_undoes_no_stop_that_came_after_it_was_typed_however_late_it_gets_through() {
+    let driver = Driver::start(&resting("real", 1));
+    assert_eq!(io_driver(&["emergency-stop"], driver.socket()).status, Some(0));
+    let pid = rustix::process::Pid::from_child(&driver.child);
+    rustix::process::kill_process(pid, Signal::STOP).expect("our own child");
+    let mut typed = programs::io_driver();
+    typed.args(["clear-fault", "--socket"]).arg(driver.socket());
+    let mut typed = Running::start(&mut typed);
+    let descriptors = format!("/proc/{}/fd", typed.id());
+    patience::until("it asks the driver for a place to look from", || {
+        let open = std::fs::read_dir(&descriptors).into_iter().flatten().flatten();
+        let mut links = open.filter_map(|entry| std::fs::read_link(entry.path()).ok());
+        links.any(|link| link.to_string_lossy().starts_with("socket:"))
+    });
+    stop_socket::send(driver.socket()).expect("it is heard when it goes on");
+    rustix::process::kill_process(pid, Signal::CONT).expect("our own child");
+    let end = typed.end();
+    assert!(end.status == Some(2) && end.err.contains("it heard this too late"), "{end:?}");
+    assert!(is_stopped(&driver));
 }
 
 /// A pipe that is full, and nobody drains it. Whoever drops its reading end breaks it.
