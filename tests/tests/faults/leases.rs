@@ -245,7 +245,7 @@ fn a_lease_is_not_told_as_ended_before_a_frame_shows_it() {
     let driver = press.driver.child.id();
     send(driver, rustix::process::Signal::STOP);
     let asked = io_driver(&["end-lease"], press.driver.socket());
-    assert_eq!((asked.status, &*asked.out), (Some(2), ""), "{asked:?}");
+    assert_eq!((asked.status, &*asked.out), (Some(3), ""), "{asked:?}");
     send(driver, rustix::process::Signal::CONT);
     let asked = io_driver(&["end-lease"], press.driver.socket());
     assert_eq!(asked.status, Some(0), "{asked:?}");
