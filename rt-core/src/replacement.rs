@@ -395,6 +395,7 @@ mod tests {
         }
         begun.keep().expect_err("it has lost its name");
         assert_eq!(std::fs::read(&place).expect("there"), b"another's");
+        assert_eq!(std::fs::read(directory.path().join("b")).expect("there"), b"mine");
         assert_eq!(names(directory.path()), ["a", "b"]);
     }
 
