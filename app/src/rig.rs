@@ -82,7 +82,7 @@ pub enum HandMode {
 /// A checked hand file.
 #[derive(Debug, Clone)]
 pub struct HandFile {
-    /// Where it lies; absolute, since the driver is told of it, too.
+    /// Absolute path: the driver is told of it, too.
     pub path: PathBuf,
     /// Its content, which the run goes by whatever becomes of the file.
     pub bytes: Arc<[u8]>,

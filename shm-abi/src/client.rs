@@ -95,7 +95,7 @@ pub enum AttachError {
          none; ask again, or name another socket"
     )]
     HungUp {
-        /// Where it was asked.
+        /// Socket that it listened at.
         socket: PathBuf,
     },
     /// The driver speaks another major version.

@@ -5,7 +5,8 @@
 //! Output: what programs want (the layout, with `--json` the result) on standard output, what people want on standard
 //! error.
 //!
-//! Exit status: 0 done; 2 bad usage or bad input, and pairs that determine nothing; 3 the driver went away meanwhile, or pairs were not saved.
+//! Exit status: 0 done; 2 bad usage or bad input, and pairs that determine nothing; 3 the driver went away meanwhile, or pairs or the
+//! layout could not be written beside a result that is told.
 
 #![allow(non_snake_case)] // Frames are capital letters: X_WF takes F to W.
 
@@ -44,7 +45,8 @@ Without --write the new layout goes to standard output.\n\n\
   phantom3 calibrate --live --device 1 --write        hold the end points together, follow the words, done\n  \
 phantom3 calibrate --pairs pairs.csv --plot residuals.svg\n  \
 phantom3 run SCENE.toml --attach                    uses what --write wrote\n\n\
-Exit status: 0 done; 2 bad usage, bad input, or pairs that determine nothing; 3 the driver went away, or pairs were not saved.";
+Exit status: 0 done; 2 bad usage, bad input, or pairs that determine nothing; 3 the driver went away, or \
+pairs or an edited layout were not written.";
 
 /// Arguments of `calibrate`.
 #[derive(Debug, Args)]
@@ -206,9 +208,9 @@ pub enum CalibrateFailure {
         /// Of the figure.
         failure: Box<CalibrateFailure>,
     },
-    /// The result is told, and something beside it was lost.
-    #[error("{0}; all else is done")]
-    AllElse(Box<CalibrateFailure>),
+    /// The result is told, and so was what could not be written beside it.
+    #[error("what is told above is not written; all else is done")]
+    AllElse,
     /// Pairs would take the place of something else.
     #[error(
         "--save-pairs {}: found a file that holds no pairs; name another one, or move it away", .0.display()
@@ -227,7 +229,7 @@ pub fn run(args: &CalibrateArgs) -> ExitCode {
             say(format_args!("phantom3 calibrate: {failure}"));
             let is_fault = match &failure {
                 CalibrateFailure::Live(error) => error.is_fault(),
-                failure => matches!(failure, CalibrateFailure::AllElse(_)),
+                failure => matches!(failure, CalibrateFailure::AllElse),
             };
             ExitCode::from(if is_fault { 3 } else { 2 })
         }
@@ -236,10 +238,11 @@ pub fn run(args: &CalibrateArgs) -> ExitCode {
 
 fn run_to_end(args: &CalibrateArgs) -> Result<(), CalibrateFailure> {
     let mut plan = Plan::check(args)?;
-    let (origin, pairs, unsaved) = get_pairs(args)?;
-    if args.pairs.is_none() {
-        // Others may have edited it since: devices are gathered at for minutes.
-        plan.read_layout()?;
+    let (origin, pairs, is_saved) = get_pairs(args)?;
+    // Others may have edited it since: devices are gathered at for minutes.
+    let is_current = args.pairs.is_some() || is_done(plan.read_layout());
+    if !is_current {
+        plan.write = None;
     }
     let model = if args.affine { Model::Affine } else { Model::Rigid };
     let found = calibrate(&pairs, model)
@@ -273,7 +276,12 @@ fn run_to_end(args: &CalibrateArgs) -> Result<(), CalibrateFailure> {
         Some(layout) => CalibrateFailure::OnlyWritten { layout, failure: Box::new(failure) },
         None => failure,
     })?;
-    unsaved.map_or(Ok(()), |failure| Err(CalibrateFailure::AllElse(Box::new(failure))))
+    if is_saved && is_current { Ok(()) } else { Err(CalibrateFailure::AllElse) }
+}
+
+/// False, once told, for what is to cost nothing else.
+fn is_done(result: Result<(), CalibrateFailure>) -> bool {
+    result.inspect_err(|failure| say(format_args!("phantom3 calibrate: {failure}"))).is_ok()
 }
 
 /// What can be checked before anybody moves a device.
@@ -318,13 +326,14 @@ impl Plan {
         Ok(plan)
     }
 
-    /// The layout as it is now; one that is edited may be there only since a moment.
+    /// The layout as it is now; one that is edited may be there only since a moment. One that is wrong leaves that of before.
     fn read_layout(&mut self) -> Result<(), CalibrateFailure> {
         if self.base_file.is_none() {
             self.base_file = self.write.clone().filter(|file| file.exists());
         }
-        self.base = self.base_file.as_deref().map(layout_file::read).transpose()?.unwrap_or_default();
-        self.layout = Layout::parse(&self.base, self.base_file.as_deref().unwrap_or(Path::new("layout")))?;
+        let base = self.base_file.as_deref().map(layout_file::read).transpose()?.unwrap_or_default();
+        self.layout = Layout::parse(&base, self.base_file.as_deref().unwrap_or(Path::new("layout")))?;
+        self.base = base;
         Ok(())
     }
 
@@ -360,16 +369,14 @@ fn refuse_streams(args: &CalibrateArgs, write: Option<&Path>) -> Result<(), Cali
     outputs::check_streams(&outputs.collect::<Vec<_>>(), &inputs).map_err(CalibrateFailure::Stream)
 }
 
-/// The pairs, where they come from in words, and why they are not saved.
-type Got = (String, Vec<Pair>, Option<CalibrateFailure>);
-
-fn get_pairs(args: &CalibrateArgs) -> Result<Got, CalibrateFailure> {
+/// Origin of the pairs in words, the pairs, and whether they are saved as was asked.
+fn get_pairs(args: &CalibrateArgs) -> Result<(String, Vec<Pair>, bool), CalibrateFailure> {
     if let Some(file) = &args.pairs {
         let text =
             read_pairs(file).map_err(|source| CalibrateFailure::Unreadable { file: file.clone(), source })?;
         let pairs =
             parse_pairs(&text).map_err(|source| CalibrateFailure::Pairs { file: file.clone(), source })?;
-        return Ok((file.display().to_string(), pairs, None));
+        return Ok((file.display().to_string(), pairs, true));
     }
     let signals = StopSignals::install().map_err(CalibrateFailure::Signals)?;
     let socket = args.live.as_ref().filter(|socket| !socket.as_os_str().is_empty());
@@ -382,16 +389,16 @@ fn get_pairs(args: &CalibrateArgs) -> Result<Got, CalibrateFailure> {
     // Found out now, not after a minute of holding two arms together.
     args.save_pairs.as_ref().map_or(Ok(()), |file| refuse_unwritable(file))?;
     let gathered = live::gather(&wish, &signals);
-    // Too few take the place of none that are there.
+    // Pairs that determine nothing do not replace a file.
     let is_worth = |file: &&PathBuf| gathered.pairs.len() >= FEWEST_PAIRS || !file.exists();
     let has_result = gathered.end.is_ok() || !gathered.pairs.is_empty();
     let file = args.save_pairs.as_ref().filter(|_| has_result).filter(is_worth);
-    let saved = file.map_or(Ok(()), |file| save_pairs(file, &gathered.pairs));
+    let is_saved = file.is_none_or(|file| is_done(save_pairs(file, &gathered.pairs)));
     gathered.end?;
-    Ok((wish.socket.display().to_string(), gathered.pairs, saved.err()))
+    Ok((wish.socket.display().to_string(), gathered.pairs, is_saved))
 }
 
-/// What a rigid transform takes.
+/// Pairs that a rigid transform takes.
 const FEWEST_PAIRS: usize = 3;
 
 /// Pipes that somebody writes are welcome; what never begins or never ends is not.

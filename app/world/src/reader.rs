@@ -491,6 +491,6 @@ const OF_MOVING: [&str; 7] = [
 ];
 /// Keys that say what a table is, so that what lies beneath it is of no use to it.
 const OF_ITS_OWN: [&str; 2] = ["kind", "model"];
-/// What the kernel takes, without its end.
+/// Longest path that the kernel takes, without its end (bytes).
 const MOST_PATH_BYTES: usize = 4095;
 const WIDE_INTEGER: &str = "an integer of at most 64 bits, or a number with a point or an exponent";

@@ -166,7 +166,7 @@ fn openings(file: &Path, during: impl FnOnce()) -> usize {
         .count()
 }
 
-/// What was checked and recorded is what is played, whoever changes the file meanwhile.
+/// A run plays the hand that was checked and recorded, whoever changes the file meanwhile.
 #[test]
 fn a_hand_file_is_read_once_whatever_clock_and_however_many_devices_follow_it() {
     let place = workplace();

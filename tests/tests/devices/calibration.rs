@@ -386,18 +386,20 @@ fn a_live_calibration_makes_two_devices_meet_in_one_world() {
     done(&again);
     assert_eq!(parse(&again.out).placement(1), layout.placement(1));
 
-    // Pairs that cannot be saved cost nothing else.
+    // Pairs that cannot be saved and a layout that somebody spoils cost nothing else.
     std::fs::create_dir(place.path("gone")).expect("a directory");
-    let arguments = ["--seconds", "4", "--save-pairs", "gone/pairs.csv", "--layout", "in.toml"];
+    std::fs::copy(place.path("in.toml"), place.path("out.toml")).expect("a copy");
+    let arguments = ["--seconds", "4", "--save-pairs", "gone/pairs.csv", "--write", "out.toml"];
     let gathering = Running::start(live(&place, &driver, &arguments));
     patience::until("it gathers", || gathering.said_so_far().contains("pairs"));
     std::fs::remove_dir_all(place.path("gone")).expect("our own");
+    place.write("out.toml", "[[device]\n");
     let unsaved = gathering.wait();
     assert_eq!(unsaved.status, Some(3), "{unsaved:?}");
-    assert!(
-        unsaved.err.contains("cannot be written") && unsaved.err.contains("all else is done"),
-        "{unsaved:?}"
-    );
+    for words in ["pairs.csv: cannot be written", "out.toml:1", "all else is done"] {
+        assert!(unsaved.err.contains(words), "{words}: {}", unsaved.err);
+    }
+    assert_eq!(std::fs::read_to_string(place.path("out.toml")).expect("there"), "[[device]\n");
     assert_stands(&parse(&unsaved.out), 1, &truth()[1]);
 
     signal(&commander, Signal::INT);
