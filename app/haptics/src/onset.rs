@@ -7,7 +7,7 @@
 //!
 //! Model: the force of a contact that begins inside ramps in, and the spring is no longer than the overlap, with what the HIP
 //! has moved since, in the entity's frame. The overlap is a lower bound of the way out that every shape knows. As soon as
-//! the spring is within this bound, the bound is dropped. From there on the god-object only follows: it is never farther from
+//! the spring and the way to the god-object are within this bound, the bound is dropped. From there on the god-object only follows: it is never farther from
 //! the HIP than a tick ago, but for what the HIP has moved. A tick in which it is brings the bound back, and is told.
 //!
 //! A god-object that did not come to rest within its tick's work, or that flies from one part to the next, bears less than
@@ -150,7 +150,9 @@ impl Onset {
             Longest::Growing(bound_m) if step > 0.0 => bound_m + input.way_m() + step * spring_m,
             Longest::Growing(_) => f64::INFINITY,
         };
-        if spring_m <= bound_m * (1.0 + ROUNDING) {
+        // One in flight bears nothing, until it comes to rest far away.
+        let is_near = matches!(self.longest, Longest::Growing(_)) || self.lag_m <= bound_m + SLACK_M;
+        if is_near && spring_m <= bound_m * (1.0 + ROUNDING) {
             self.longest = Longest::Any;
             return 1.0;
         }
@@ -158,8 +160,8 @@ impl Onset {
             Longest::Growing(_) => Longest::Growing(bound_m),
             _ => Longest::Bound(bound_m),
         };
-        self.spring_m = bound_m;
-        bound_m / spring_m
+        self.spring_m = spring_m.min(bound_m);
+        (bound_m / spring_m).min(1.0)
     }
 }
 

@@ -100,6 +100,17 @@ fn no_ball_that_begins_overlapping_is_flung() {
     begin_on_ugly_meshes(1..3, 40);
 }
 
+/// Starts deep between parts that pass through each other: a ball that was put outside flies on, and comes to rest on a wall
+/// that is nearer.
+#[test]
+fn no_ball_that_flies_on_from_where_it_was_put_is_flung_when_it_lands() {
+    for (seed, boxes, starts) in [(5, "heap of boxes", 1444), (6, "crossed boxes", 1218)] {
+        let (name, soup) = ugly::all(seed).into_iter().find(|(name, _)| *name == boxes).unwrap();
+        let mesh = Arc::new(Mesh::build(soup).unwrap().0);
+        begin_all_over(name, &mesh, Friction::None, 2e-4, starts, seed);
+    }
+}
+
 /// Ten million starts.
 #[test]
 #[ignore = "hours"]
