@@ -7,7 +7,11 @@ use crate::painter::{bytes, mask, material, mesh_of};
 use crate::stage::Thing;
 use crate::triangles::Triangles;
 use std::sync::Arc;
-use three_d::{Context, Geometry, Gm, InstancedMesh, Instances, Mat4, Mesh, Object, PhysicalMaterial};
+use three_d::{
+    Context, CpuTexture, Geometry, Gm, InstancedMesh, Instances, Mat4, Mesh, Object, PhysicalMaterial,
+    Texture2DRef, TextureData, Wrapping,
+};
+use world::model::{Texture, Wrap};
 
 /// All things of a stage.
 pub(crate) struct Crowd {
@@ -35,9 +39,10 @@ struct Clear {
 impl Crowd {
     pub(crate) fn new(context: &Context, things: &[Thing]) -> Self {
         let (mut alike, mut clear) = (Vec::<Alike>::new(), Vec::new());
+        let mut textures = Textures { context, made: Vec::new() };
         for thing in things {
             if thing.colour[3] < 1.0 {
-                clear.push(Clear::new(context, thing));
+                clear.push(Clear::new(context, thing, textures.of(thing)));
                 continue;
             }
             let is_like = |known: &&mut Alike| {
@@ -45,7 +50,7 @@ impl Crowd {
             };
             match alike.iter_mut().find(is_like) {
                 Some(known) => known.things.push(thing.clone()),
-                None => alike.push(Alike::new(context, thing)),
+                None => alike.push(Alike::new(context, thing, textures.of(thing))),
             }
         }
         Self { alike, clear }
@@ -86,8 +91,41 @@ impl Crowd {
     }
 }
 
+/// Textures in the graphics memory: each is there once.
+struct Textures<'c> {
+    context: &'c Context,
+    made: Vec<(Arc<Texture>, Texture2DRef)>,
+}
+
+impl Textures<'_> {
+    fn of(&mut self, thing: &Thing) -> Option<Texture2DRef> {
+        let texture = thing.texture.as_ref()?;
+        if let Some((_, made)) = self.made.iter().find(|(of, _)| Arc::ptr_eq(of, texture)) {
+            return Some(made.clone());
+        }
+        let [wrap_s, wrap_t] = texture.wraps.map(|wrap| match wrap {
+            Wrap::Repeat => Wrapping::Repeat,
+            Wrap::Mirror => Wrapping::MirroredRepeat,
+            Wrap::Edge => Wrapping::ClampToEdge,
+        });
+        let mut texels = CpuTexture {
+            data: TextureData::RgbaU8(texture.texels.clone()),
+            width: texture.size[0],
+            height: texture.size[1],
+            wrap_s,
+            wrap_t,
+            ..CpuTexture::default()
+        };
+        // Light is computed with shares of its power.
+        texels.data.to_linear_srgb();
+        let made = Texture2DRef::from_cpu_texture(self.context, &texels);
+        self.made.push((Arc::clone(texture), made.clone()));
+        Some(made)
+    }
+}
+
 impl Alike {
-    fn new(context: &Context, first: &Thing) -> Self {
+    fn new(context: &Context, first: &Thing, texture: Option<Texture2DRef>) -> Self {
         let shown = Instances { colors: Some(Vec::new()), ..Instances::default() };
         let mesh = InstancedMesh::new(context, &shown, &mesh_of(&first.triangles));
         Self {
@@ -95,7 +133,7 @@ impl Alike {
             casts_shadow: first.casts_shadow,
             things: vec![first.clone()],
             shown,
-            model: Gm::new(mesh, material(context, [1.0; 4])),
+            model: Gm::new(mesh, PhysicalMaterial { albedo_texture: texture, ..material(context, [1.0; 4]) }),
         }
     }
 
@@ -116,9 +154,10 @@ impl Alike {
 }
 
 impl Clear {
-    fn new(context: &Context, thing: &Thing) -> Self {
+    fn new(context: &Context, thing: &Thing, texture: Option<Texture2DRef>) -> Self {
         let mesh = Mesh::new(context, &mesh_of(&thing.triangles));
-        let model = Gm::new(mesh, material(context, thing.colour));
+        let model =
+            Gm::new(mesh, PhysicalMaterial { albedo_texture: texture, ..material(context, thing.colour) });
         Self { thing: thing.clone(), is_seen: false, at: Mat4::from_scale(0.0), model }
     }
 

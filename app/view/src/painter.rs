@@ -10,7 +10,7 @@ use crate::triangles::Triangles;
 use nalgebra::{Isometry3, UnitQuaternion};
 use three_d::{
     AmbientLight, ClearState, Context, CpuMaterial, CpuMesh, DirectionalLight, Indices, Light, Mat4,
-    PhysicalMaterial, Positions, RenderTarget, Srgba, Viewport, WriteMask, vec3,
+    PhysicalMaterial, Positions, RenderTarget, Srgba, Viewport, WriteMask, vec2, vec3,
 };
 use world::{LightKind, SceneCamera, SceneLight};
 
@@ -259,6 +259,8 @@ pub(crate) fn mesh_of(triangles: &Triangles) -> CpuMesh {
     CpuMesh {
         positions: Positions::F32(triangles.places.iter().map(|place| vector(&place.coords)).collect()),
         normals: Some(triangles.normals.iter().map(vector).collect()),
+        uvs: (!triangles.uv.is_empty())
+            .then(|| triangles.uv.iter().map(|[u, v]| vec2(*u as f32, *v as f32)).collect()),
         indices: Indices::U32(triangles.corners.as_flattened().to_vec()),
         ..CpuMesh::default()
     }

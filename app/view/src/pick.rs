@@ -202,6 +202,8 @@ mod tests {
             triangles,
             pose: Isometry3::identity(),
             colour: [1.0; 4],
+            is_coloured: true,
+            texture: None,
             casts_shadow: false,
             space: 0,
         });

@@ -42,6 +42,8 @@ pub(crate) fn all(specs: &[SceneEntity], entities: &[Entity]) -> Vec<Thing> {
             triangles,
             pose: Isometry3::identity(),
             colour: COLOUR,
+            is_coloured: true,
+            texture: None,
             casts_shadow: false,
             space: entity.space,
         }));

@@ -3,6 +3,7 @@
 use crate::solids;
 use crate::triangles::{Ring, Triangles};
 use haptics::Shape;
+use haptics::mesh::CornerUv;
 use nalgebra::{Point3, UnitQuaternion, Vector3};
 use std::f64::consts::{PI, TAU};
 use world::ShapeSpec;
@@ -41,7 +42,7 @@ fn modelled(shape: &Shape) -> Option<Triangles> {
     match shape {
         Shape::Mesh(mesh) => {
             let faces: Vec<[u32; 3]> = mesh.faces().iter().map(|face| face.vertices).collect();
-            Some(smooth(mesh.vertices(), &faces))
+            Some(smooth(mesh.vertices(), &faces, &[]))
         }
         Shape::Nurbs(nurbs) => Some(patches(nurbs)),
         Shape::Csg(csg) => Some(solids::triangles(csg)),
@@ -114,7 +115,9 @@ fn torus(ring_m: f64, tube_m: f64) -> Triangles {
 }
 
 /// Smooth where faces meet at a small angle; sharp edges stay sharp.
-pub(crate) fn smooth(vertices: &[Vector3<f64>], faces: &[[u32; 3]]) -> Triangles {
+///
+/// `uv`: where the corners of each face are on a texture, or nothing.
+pub(crate) fn smooth(vertices: &[Vector3<f64>], faces: &[[u32; 3]], uv: &[CornerUv]) -> Triangles {
     let normal_of = |face: &[u32; 3]| {
         let [a, b, c] = face.map(|vertex| vertices[vertex as usize]);
         (b - a).cross(&(c - a))
@@ -125,7 +128,7 @@ pub(crate) fn smooth(vertices: &[Vector3<f64>], faces: &[[u32; 3]]) -> Triangles
         face.iter().for_each(|vertex| around[*vertex as usize].push(weighted));
     }
     let (mut made, least_cos) = (Triangles::default(), CREASE_RAD.cos());
-    for face in faces {
+    for (index, face) in faces.iter().enumerate() {
         // What has no area is not seen.
         let Some(own) = normal_of(face).try_normalize(0.0) else { continue };
         let first = made.places.len() as u32;
@@ -136,6 +139,7 @@ pub(crate) fn smooth(vertices: &[Vector3<f64>], faces: &[[u32; 3]]) -> Triangles
             made.normals.push(sum.try_normalize(0.0).unwrap_or(own));
         }
         made.corners.push([first, first + 1, first + 2]);
+        made.uv.extend(uv.get(index).into_iter().flatten());
     }
     made
 }

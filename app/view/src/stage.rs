@@ -8,6 +8,7 @@ use haptics::mesh::TriangleSoup;
 use haptics::{Entity, Shape};
 use nalgebra::Isometry3;
 use std::sync::Arc;
+use world::model::Texture;
 use world::seen::{SeenForm, SeenPart};
 use world::{FrictionSpec, MassSpec, Scene, SceneCamera, SceneEntity, SceneLight, ShapeSpec};
 
@@ -62,6 +63,10 @@ pub struct Thing {
     pub pose: Isometry3<f64>,
     /// Red, green, blue, opacity: 0 to 1.
     pub colour: [f64; 4],
+    /// Whether scene or file say the colour.
+    pub is_coloured: bool,
+    /// What lies on the triangles, whose colours are multiplied with it.
+    pub texture: Option<Arc<Texture>>,
     /// Whether light does not go through.
     pub casts_shadow: bool,
     /// Which space it is in: 0 the world, otherwise behind a door.
@@ -85,6 +90,7 @@ impl Stage {
         };
         let told = seen.unreadable.iter().map(|(at, why)| format!("{at}: {why}"));
         stage.not_drawn.extend(told);
+        stage.not_drawn.extend(seen.plain.iter().map(|(at, why)| format!("{at}: {why}")));
         let mut looks = Looks::default();
         for part in &seen.parts {
             let index = scene.entities.iter().position(|spec| std::ptr::eq(spec, part.entity)).unwrap_or(0);
@@ -98,6 +104,8 @@ impl Stage {
                     triangles,
                     pose: part.X_BV,
                     colour: [r, g, b, if is_clear { WALL_OPACITY * opacity } else { opacity }],
+                    is_coloured: part.is_coloured,
+                    texture: part.texture(),
                     casts_shadow: part.casts_shadow && !is_clear,
                     space,
                 }),
@@ -154,14 +162,16 @@ struct Looks<'s> {
 impl<'s> Looks<'s> {
     fn of(&mut self, part: &SeenPart<'s>, felt: Option<&Shape>) -> Option<Arc<Triangles>> {
         match &part.form {
-            SeenForm::Triangles { soup, scale } => {
+            SeenForm::Triangles { soup, scale, painting } => {
                 let alike = |(of, by, _): &&(*const TriangleSoup, [f64; 3], _)| {
                     *of == Arc::as_ptr(soup) && by == scale
                 };
                 if let Some((.., made)) = self.files.iter().find(alike) {
                     return Some(Arc::clone(made));
                 }
-                let made = Arc::new(shapes::smooth(&soup.vertices, &soup.faces).scaled(&(*scale).into()));
+                let uv = painting.as_ref().map_or(&[][..], |painting| &painting.uv);
+                let smooth = shapes::smooth(&soup.vertices, &soup.faces, uv);
+                let made = Arc::new(smooth.scaled(&(*scale).into()));
                 self.files.push((Arc::as_ptr(soup), *scale, Arc::clone(&made)));
                 Some(made)
             }

@@ -41,7 +41,7 @@ pub(crate) fn colour(scene: &Scene, things: &mut [Thing]) {
         let of_faces = entity.faces.iter().any(|faces| faces.colour.is_some());
         of_faces || entity.visuals.iter().any(|visual| visual.colour.is_some())
     };
-    if scene.entities.iter().any(says_one) {
+    if scene.entities.iter().any(says_one) || things.iter().any(|thing| thing.is_coloured) {
         return;
     }
     for thing in things.iter_mut().filter(|thing| has_end(scene, thing)) {

@@ -15,6 +15,7 @@
 //! Units and axes: the file's own (glTF: metres, y up); a scene's `scale` makes metres of them, and its orientation turns them.
 //! Cost: one pass; a million triangles take a fraction of a second.
 
+mod appearance;
 mod ase;
 mod face_names;
 mod foreign;
@@ -26,10 +27,12 @@ mod patches;
 mod ply;
 mod polygon;
 mod stl;
+mod texture;
 mod three_ds;
 mod words;
 mod write;
 
+pub use appearance::{Appearance, Finish};
 pub use ase::read_ase;
 pub use face_names::FaceNames;
 pub use free_form::read_free_form;
@@ -38,6 +41,7 @@ pub use obj::{line_of_face, read_obj, read_obj_with_uv};
 pub use patches::{read_patches, write_patches};
 pub use ply::read_ply;
 pub use stl::read_stl;
+pub use texture::{Texture, Wrap};
 pub use three_ds::read_three_ds;
 pub use write::write_obj;
 
@@ -256,6 +260,17 @@ pub fn read_names(file: &Path, bytes: &[u8]) -> Result<Option<FaceNames>, ModelE
         Format::Gltf => Some(gltf::read_gltf_names(bytes, directory_of(file))?),
         Format::Ase => Some(ase::read_ase_names(bytes)?),
         Format::ThreeDs => Some(three_ds::read_three_ds_names(bytes)?),
+    })
+}
+
+/// How the faces that [`read`] reads look; `None`: the format has nothing on that, or nothing of it is read.
+///
+/// # Errors
+/// As [`read`].
+pub fn read_appearance(file: &Path, bytes: &[u8]) -> Result<Option<Appearance>, ModelError> {
+    Ok(match format(file, bytes)? {
+        Format::Gltf => Some(gltf::read_gltf_appearance(bytes, directory_of(file))?),
+        _ => None,
     })
 }
 

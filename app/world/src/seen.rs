@@ -2,7 +2,8 @@
 //!
 //! Model: of each entity a list of parts, each a form in a frame of its own, a colour and a shadow. What is seen need not be
 //! what is felt: a fine mesh over a coarse feel, or the reverse. Each file is read once, however many parts show it, and
-//! is not touched by what is felt.
+//! is not touched by what is felt. Where the scene says no colour the file does, if its format has materials: a part then
+//! shows the faces of one of them.
 //! Frames: W world, B the entity's, V the part's: `X_WB * X_BV`, where `X_WB` is the entity's pose, or that which a run tells of
 //! one that moves. A part within an environment is for eyes that are in it.
 
@@ -12,14 +13,14 @@ use std::collections::BTreeMap;
 use std::path::Path;
 use std::sync::Arc;
 
-use haptics::mesh::TriangleSoup;
+use haptics::mesh::{CornerUv, TriangleSoup};
 use nalgebra::Isometry3;
 
 use crate::camera::SceneCamera;
 use crate::entity::SceneEntity;
 use crate::error::Location;
 use crate::light::SceneLight;
-use crate::model::{self, ModelError};
+use crate::model::{self, Appearance, ModelError, Texture};
 use crate::scene::Scene;
 use crate::shape::ShapeSpec;
 use crate::visual::VisualSpec;
@@ -35,6 +36,8 @@ pub struct Seen<'s> {
     pub cameras: &'s [SceneCamera],
     /// What could not be read, each once: whoever shows it is not among the parts.
     pub unreadable: Vec<(&'s Location, Arc<ModelError>)>,
+    /// Materials and textures that could not be read, each once: whoever shows them is plain.
+    pub plain: Vec<(&'s Location, String)>,
 }
 
 /// A part of what is seen of an entity.
@@ -48,8 +51,22 @@ pub struct SeenPart<'s> {
     pub X_BV: Isometry3<f64>,
     /// Red, green, blue and opacity, 0 to 1.
     pub colour: [f64; 4],
+    /// Whether scene or file say the colour.
+    pub is_coloured: bool,
     /// Whether it casts a shadow.
     pub casts_shadow: bool,
+}
+
+impl SeenPart<'_> {
+    /// What lies on its triangles.
+    pub fn texture(&self) -> Option<Arc<Texture>> {
+        match &self.form {
+            SeenForm::Triangles { painting, .. } => {
+                painting.as_ref().map(|painting| painting.texture.clone())
+            }
+            SeenForm::Shape(_) => None,
+        }
+    }
 }
 
 /// The form of a part.
@@ -61,16 +78,32 @@ pub enum SeenForm<'s> {
         soup: Arc<TriangleSoup>,
         /// Above 0.
         scale: [f64; 3],
+        /// What lies on them.
+        painting: Option<Arc<Painting>>,
     },
     /// Closed forms, trees and patches: by their sizes.
     Shape(&'s ShapeSpec),
 }
 
+/// A texture, and where on it the corners of each triangle are.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Painting {
+    /// In pictures, from the upper left corner.
+    pub uv: Vec<CornerUv>,
+    /// Its colours are multiplied with the part's.
+    pub texture: Arc<Texture>,
+}
+
 impl Scene {
     /// What is to be seen of it; reads the files of meshes.
     pub fn seen(&self) -> Seen<'_> {
-        let mut seen =
-            Seen { parts: Vec::new(), lights: &self.lights, cameras: &self.cameras, unreadable: Vec::new() };
+        let mut seen = Seen {
+            parts: Vec::new(),
+            lights: &self.lights,
+            cameras: &self.cameras,
+            unreadable: Vec::new(),
+            plain: Vec::new(),
+        };
         let mut files = Files::default();
         for entity in &self.entities {
             for visual in &entity.visuals {
@@ -89,6 +122,8 @@ type Parting<'s> = (&'s Path, Vec<&'s [String]>);
 struct Files<'s> {
     /// `None`: it was told that it cannot be read.
     whole: BTreeMap<&'s Path, Option<Arc<TriangleSoup>>>,
+    /// By materials; none where the file has none.
+    finished: BTreeMap<&'s Path, Vec<Finished>>,
     /// By the names of faces; the first part has those that have none of them.
     parted: BTreeMap<Parting<'s>, Vec<Arc<TriangleSoup>>>,
 }
@@ -97,11 +132,12 @@ impl<'s> Seen<'s> {
     fn add(&mut self, entity: &'s SceneEntity, visual: &'s VisualSpec, files: &mut Files<'s>) {
         let VisualSpec { pose, casts_shadow, .. } = *visual;
         let colour = visual.colour.unwrap_or(VisualSpec::DEFAULT_COLOUR);
+        let is_coloured = visual.colour.is_some();
         let mesh = match visual.shape.as_ref().unwrap_or(&entity.shape) {
             ShapeSpec::Mesh(mesh) => mesh,
             shape => {
                 let form = SeenForm::Shape(shape);
-                self.parts.push(SeenPart { entity, form, X_BV: pose, colour, casts_shadow });
+                self.parts.push(SeenPart { entity, form, X_BV: pose, colour, is_coloured, casts_shadow });
                 return;
             }
         };
@@ -111,12 +147,26 @@ impl<'s> Seen<'s> {
             read.map_err(|error| self.unreadable.push((&mesh.at, Arc::new(error)))).ok().map(Arc::new)
         });
         let Some(whole) = whole else { return };
-        let mut add = |soup: &Arc<TriangleSoup>, colour| {
-            let form = SeenForm::Triangles { soup: soup.clone(), scale: mesh.scale };
-            self.parts.push(SeenPart { entity, form, X_BV: pose, colour, casts_shadow });
+        let finished = match is_parted || is_coloured {
+            true => &[][..],
+            false => files.finished.entry(&mesh.file).or_insert_with(|| {
+                let (parts, said) = finished(&mesh.file, whole);
+                self.plain.extend(said.into_iter().map(|said| (&mesh.at, said)));
+                parts
+            }),
         };
+        let mut add = |soup: &Arc<TriangleSoup>, painting, colour, is_coloured| {
+            let form = SeenForm::Triangles { soup: soup.clone(), scale: mesh.scale, painting };
+            self.parts.push(SeenPart { entity, form, X_BV: pose, colour, is_coloured, casts_shadow });
+        };
+        for part in finished {
+            add(&part.soup, part.painting.clone(), part.colour.unwrap_or(colour), part.colour.is_some());
+        }
         if !is_parted {
-            return add(whole, colour);
+            if finished.is_empty() {
+                add(whole, None, colour, is_coloured);
+            }
+            return;
         }
         let names: Vec<&[String]> = entity.faces.iter().map(|faces| faces.of.as_slice()).collect();
         let parts = files
@@ -126,9 +176,37 @@ impl<'s> Seen<'s> {
         let own = entity.faces.iter().map(|faces| faces.colour.unwrap_or(colour));
         let colours = std::iter::once(colour).chain(own);
         for (part, colour) in parts.iter().zip(colours).filter(|(part, _)| !part.faces.is_empty()) {
-            add(part, colour);
+            add(part, None, colour, true);
         }
     }
+}
+
+/// The faces of a material.
+struct Finished {
+    soup: Arc<TriangleSoup>,
+    colour: Option<[f64; 4]>,
+    painting: Option<Arc<Painting>>,
+}
+
+/// The faces of each material that says how they look; and what could not be read of that.
+fn finished(file: &Path, whole: &TriangleSoup) -> (Vec<Finished>, Vec<String>) {
+    let read = model::read_file(file).and_then(|bytes| model::read_appearance(file, &bytes));
+    let Appearance { finishes, of_face, uv, unread } = match read {
+        Ok(Some(told)) if told.is_told() && told.of_face.len() == whole.faces.len() => told,
+        Ok(told) => return (Vec::new(), told.map_or_else(Vec::new, |told| told.unread)),
+        Err(error) => return (Vec::new(), vec![error.to_string()]),
+    };
+    let mut faces = vec![Vec::new(); finishes.len()];
+    of_face.iter().enumerate().for_each(|(face, finish)| faces[*finish as usize].push(face));
+    let parts = finishes.into_iter().zip(faces).filter(|(_, faces)| !faces.is_empty());
+    let parts = parts.map(|(finish, faces)| Finished {
+        soup: Arc::new(used(whole, faces.iter().map(|&face| whole.faces[face]))),
+        colour: finish.colour,
+        painting: finish
+            .texture
+            .map(|texture| Arc::new(Painting { uv: faces.iter().map(|&face| uv[face]).collect(), texture })),
+    });
+    (parts.collect(), unread)
 }
 
 /// The faces that none of these names, and those that each of them does.

@@ -13,4 +13,5 @@ mod mouse_hand;
 mod overlay;
 mod pictures;
 mod shapes;
+mod textures;
 mod usual;

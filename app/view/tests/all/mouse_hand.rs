@@ -172,12 +172,15 @@ fn square(height_m: f64) -> Thing {
         places: places.to_vec(),
         normals: vec![Vector3::y(); 4],
         corners: vec![[0, 1, 2], [0, 2, 3]],
+        ..Triangles::default()
     };
     Thing {
         entity: 0,
         triangles: Arc::new(triangles),
         pose: Isometry3::translation(0.0, height_m, 0.0),
         colour: [1.0; 4],
+        is_coloured: true,
+        texture: None,
         casts_shadow: true,
         space: 0,
     }

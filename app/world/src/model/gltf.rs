@@ -2,8 +2,9 @@
 //!
 //! Read: of the file's scene (the one that it names, else the first; all nodes if it has none) the meshes of all nodes, each
 //! where its node and those above put it, as one soup; triangles, strips and fans, with and without indices; sparse
-//! accessors; positions as floats or quantised (`KHR_mesh_quantization`); names. Metres, y up, as in a scene of ours. Passed
-//! over: pictures, cameras, lights, animations, skins and morph targets (the shape is that at rest), points and lines.
+//! accessors; positions as floats or quantised (`KHR_mesh_quantization`); names; for whoever draws it, base colours and their
+//! textures (`materials`). Metres, y up, as in a scene of ours. Passed over: cameras, lights, animations, skins and morph
+//! targets (the shape is that at rest), points and lines.
 //! Refused: compressed geometry (Draco, meshopt), and glTF 1.0.
 //!
 //! Nothing is believed: every index, range and step is checked against what is there. A node may be reached in one way only, as
@@ -16,13 +17,16 @@
 mod accessor;
 mod buffers;
 mod document;
+mod materials;
 
+use super::appearance::Appearance;
 use super::ply::Strip;
 use super::{FaceNames, ModelError};
 use accessor::Accessors;
 use buffers::Buffers;
 use document::{Document, Name, Node, Primitive};
-use haptics::mesh::TriangleSoup;
+use haptics::mesh::{CornerUv, TriangleSoup};
+use materials::Materials;
 use nalgebra::{Matrix3, Matrix4, Quaternion, UnitQuaternion, Vector3};
 use std::path::Path;
 
@@ -45,18 +49,29 @@ pub(super) fn read_gltf_names(bytes: &[u8], beside: Option<&Path>) -> Result<Fac
     Ok(read(bytes, beside)?.1)
 }
 
+/// How the triangles look.
+///
+/// # Errors
+/// As [`read_gltf`]; texture coordinates that are not as the format has them.
+pub(super) fn read_gltf_appearance(bytes: &[u8], beside: Option<&Path>) -> Result<Appearance, ModelError> {
+    let (text, binary) = buffers::parts(bytes)?;
+    let document = Document::parse(text)?;
+    let mut buffers = Buffers::load(&document, binary, beside)?;
+    let materials = Materials::read(&document, &mut buffers);
+    let mut merged = Merged::new(&document, &buffers, bytes.len());
+    merged.dressing = Some(Dressing { materials: &materials, of_face: Vec::new(), uv: Vec::new() });
+    merged.add_nodes()?;
+    let Some(Dressing { of_face, uv, .. }) = merged.dressing else { return Ok(Appearance::default()) };
+    let Materials { finishes, unread, .. } = materials;
+    Ok(Appearance { finishes, of_face, uv, unread })
+}
+
 fn read(bytes: &[u8], beside: Option<&Path>) -> Result<(TriangleSoup, FaceNames), ModelError> {
     let (text, binary) = buffers::parts(bytes)?;
     let document = Document::parse(text)?;
     document.check()?;
     let buffers = Buffers::load(&document, binary, beside)?;
-    let most = ALWAYS_ALLOWED.max(bytes.len() + buffers.bytes_beside());
-    let mut merged = Merged {
-        document: &document,
-        accessors: Accessors::new(&document, &buffers, most),
-        soup: TriangleSoup { vertices: Vec::new(), faces: Vec::new() },
-        names: FaceNames::default(),
-    };
+    let mut merged = Merged::new(&document, &buffers, bytes.len());
     merged.add_nodes()?;
     if merged.soup.faces.is_empty() { Err(ModelError::NoTriangle) } else { Ok((merged.soup, merged.names)) }
 }
@@ -76,9 +91,29 @@ struct Merged<'d> {
     accessors: Accessors<'d>,
     soup: TriangleSoup,
     names: FaceNames,
+    /// If somebody asks for it.
+    dressing: Option<Dressing<'d>>,
 }
 
-impl Merged<'_> {
+/// Looks of the triangles.
+struct Dressing<'d> {
+    materials: &'d Materials,
+    of_face: Vec<u32>,
+    uv: Vec<CornerUv>,
+}
+
+impl<'d> Merged<'d> {
+    fn new(document: &'d Document, buffers: &'d Buffers<'d>, bytes: usize) -> Self {
+        let most = ALWAYS_ALLOWED.max(bytes + buffers.bytes_beside());
+        Self {
+            document,
+            accessors: Accessors::new(document, buffers, most),
+            soup: TriangleSoup { vertices: Vec::new(), faces: Vec::new() },
+            names: FaceNames::default(),
+            dressing: None,
+        }
+    }
+
     fn add_nodes(&mut self) -> Result<(), ModelError> {
         let nodes = &self.document.nodes;
         let mut is_reached = vec![false; nodes.len()];
@@ -153,6 +188,7 @@ impl Merged<'_> {
         if linear(X_WN).determinant() < 0.0 {
             faces.iter_mut().for_each(|face| face.swap(1, 2));
         }
+        self.dress(primitive, &faces, place)?;
         // Others may use the other vertices of the same accessor.
         let mut places = vec![u32::MAX; positions.len()];
         for corner in faces.iter_mut().flatten() {
@@ -169,6 +205,25 @@ impl Merged<'_> {
             *corner = *own;
         }
         self.soup.faces.extend(faces);
+        Ok(())
+    }
+}
+
+impl Merged<'_> {
+    /// Notes how faces look, by their corners' numbers within the primitive.
+    fn dress(&mut self, primitive: &Primitive, faces: &[[u32; 3]], place: &str) -> Result<(), ModelError> {
+        let Some(dressing) = &mut self.dressing else { return Ok(()) };
+        let (finish, lie) = dressing.materials.of(primitive.material);
+        dressing.of_face.extend(faces.iter().map(|_| finish));
+        let sets = [&primitive.attributes.uv_0, &primitive.attributes.uv_1];
+        let index = lie.and_then(|lie| sets.get(lie.set)?.as_u64());
+        let (Some(lie), Some(index)) = (lie, index) else {
+            dressing.uv.extend(faces.iter().map(|_| CornerUv::default()));
+            return Ok(());
+        };
+        let uv = self.accessors.uv(usize::try_from(index).unwrap_or(usize::MAX), place)?;
+        let at = |corner: u32| uv.get(corner as usize).map_or([0.0; 2], |uv| lie.placed([uv.x, uv.y]));
+        dressing.uv.extend(faces.iter().map(|face| face.map(at)));
         Ok(())
     }
 }

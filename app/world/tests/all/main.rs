@@ -12,6 +12,7 @@ mod written;
 
 mod any_model;
 mod any_text;
+mod appearance;
 mod default_hand;
 mod effects;
 mod events;

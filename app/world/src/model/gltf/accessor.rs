@@ -4,7 +4,7 @@ use super::buffers::Buffers;
 use super::document::{Accessor, Document, Sparse};
 use super::{missing, wrong};
 use crate::model::ModelError;
-use nalgebra::Vector3;
+use nalgebra::{SVector, Vector2, Vector3};
 
 pub(super) struct Accessors<'d> {
     document: &'d Document,
@@ -24,36 +24,50 @@ impl<'d> Accessors<'d> {
         index: usize,
         primitive: &str,
     ) -> Result<Vec<Vector3<f64>>, ModelError> {
-        let (place, accessor) = self.accessor(index, &format!("{primitive}.attributes.POSITION"))?;
-        if accessor.kind != "VEC3" {
-            return Err(kind(&place, accessor, "VEC3, since a primitive has it for its positions"));
+        self.vectors(index, &format!("{primitive}.attributes.POSITION"), "positions")
+    }
+
+    /// Texture coordinates, in pictures from the upper left corner.
+    pub(super) fn uv(&mut self, index: usize, primitive: &str) -> Result<Vec<Vector2<f64>>, ModelError> {
+        self.vectors(index, &format!("{primitive}.attributes.TEXCOORD"), "texture coordinates")
+    }
+
+    fn vectors<const N: usize>(
+        &mut self,
+        index: usize,
+        user: &str,
+        what: &str,
+    ) -> Result<Vec<SVector<f64, N>>, ModelError> {
+        let (place, accessor) = self.accessor(index, user)?;
+        if accessor.kind != format!("VEC{N}") {
+            return Err(kind(&place, accessor, &format!("VEC{N}, since a primitive has it for its {what}")));
         }
         let component = Component::of(accessor.component_type)
             .filter(|component| *component != Component::U32)
             .ok_or_else(|| {
-                component_type(&place, accessor.component_type, "5120 to 5123 or 5126 for positions")
+                component_type(&place, accessor.component_type, &format!("5120 to 5123 or 5126 for {what}"))
             })?;
-        let mut positions = vec![Vector3::zeros(); self.take(accessor.count, &place)?];
+        let mut vectors = vec![SVector::<f64, N>::zeros(); self.take(accessor.count, &place)?];
         let read = |bytes: &[u8]| {
-            Vector3::from_fn(|axis, _| {
+            SVector::from_fn(|axis, _| {
                 component.value(&bytes[axis * component.bytes()..], accessor.normalized)
             })
         };
-        let width = 3 * component.bytes();
+        let width = N * component.bytes();
         if let Some(view) = accessor.buffer_view {
             let elements = self.elements(view, accessor.byte_offset, accessor.count, width, &place)?;
-            positions.iter_mut().zip(elements).for_each(|(position, bytes)| *position = read(bytes));
+            vectors.iter_mut().zip(elements).for_each(|(vector, bytes)| *vector = read(bytes));
         }
         if let Some(sparse) = &accessor.sparse {
             let (at, values) = self.sparse(sparse, width, accessor.count, &place)?;
-            at.into_iter().zip(values).for_each(|(at, bytes)| positions[at as usize] = read(bytes));
+            at.into_iter().zip(values).for_each(|(at, bytes)| vectors[at as usize] = read(bytes));
         }
-        match positions.iter().position(|position| !position.iter().all(|x| x.is_finite())) {
+        match vectors.iter().position(|vector| !vector.iter().all(|x| x.is_finite())) {
             Some(element) => {
-                let [x, y, z] = positions[element].into();
-                Err(wrong(place, format!("element {element} at [{x:?}, {y:?}, {z:?}]"), "finite numbers"))
+                let at = vectors[element].as_slice();
+                Err(wrong(place, format!("element {element} at {at:?}"), "finite numbers"))
             }
-            None => Ok(positions),
+            None => Ok(vectors),
         }
     }
 
@@ -158,18 +172,11 @@ impl<'d> Accessors<'d> {
     ) -> Result<impl Iterator<Item = &'d [u8]> + use<'d>, ModelError> {
         let views = &self.document.buffer_views;
         let view_place = format!("bufferViews[{view}]");
-        let view =
-            views.get(view).ok_or_else(|| missing(&format!("{place}.bufferView = {view}"), views.len()))?;
-        let buffer = self.buffers.get(view.buffer);
-        let buffer = buffer
-            .ok_or_else(|| missing(&format!("{view_place}.buffer = {}", view.buffer), self.buffers.len()))?;
-        let bytes = buffer.get(view.byte_offset..).and_then(|rest| rest.get(..view.byte_length)).ok_or_else(
-            || {
-                let found = format!("{} bytes from byte {}", view.byte_length, view.byte_offset);
-                wrong(view_place.clone(), found, &format!("a part of a buffer of {} bytes", buffer.len()))
-            },
-        )?;
-        let stride = view.byte_stride.unwrap_or(width);
+        let stride = views.get(view).and_then(|view| view.byte_stride).unwrap_or(width);
+        if view >= views.len() {
+            return Err(missing(&format!("{place}.bufferView = {view}"), views.len()));
+        }
+        let bytes = self.buffers.of_view(self.document, view)?;
         if stride < width {
             return Err(wrong(view_place, format!("byteStride {stride}"), &format!("{width} or more")));
         }

@@ -1,13 +1,15 @@
 //! The bytes that a glTF file is about: within it, in data URIs, or in files beside it.
 
 use super::document::Document;
-use super::wrong;
+use super::{missing, wrong};
 use crate::model::{MAX_MODEL_BYTES, ModelError, read_file, shown};
 use std::borrow::Cow;
 use std::path::{Component, Path, PathBuf};
 
 pub(super) struct Buffers<'b> {
     all: Vec<Cow<'b, [u8]>>,
+    /// The directory of the files beside it.
+    beside: Option<&'b Path>,
     bytes_beside: usize,
 }
 
@@ -58,19 +60,16 @@ impl<'b> Buffers<'b> {
     pub(super) fn load(
         document: &'b Document,
         binary: Option<&'b [u8]>,
-        beside: Option<&Path>,
+        beside: Option<&'b Path>,
     ) -> Result<Self, ModelError> {
-        let mut buffers = Self { all: Vec::new(), bytes_beside: 0 };
+        let mut buffers = Self { all: Vec::new(), beside, bytes_beside: 0 };
         for (index, buffer) in document.buffers.iter().enumerate() {
             let place = format!("buffers[{index}]");
             let bytes = match (&buffer.uri, binary) {
                 (None, Some(binary)) if index == 0 => Cow::Borrowed(binary),
                 // Another program's, in place of compressed data.
                 (None, _) => Cow::Borrowed(&[][..]),
-                (Some(uri), _) => match uri.strip_prefix("data:") {
-                    Some(data) => Cow::Owned(decoded(data, &place)?),
-                    None => Cow::Owned(buffers.read(uri, &place, beside)?),
-                },
+                (Some(uri), _) => Cow::Owned(buffers.of_uri(uri, &place)?),
             };
             if bytes.len() < buffer.byte_length && !(bytes.is_empty() && buffer.uri.is_none()) {
                 let found = format!("{} bytes", bytes.len());
@@ -93,17 +92,39 @@ impl<'b> Buffers<'b> {
         self.all.len()
     }
 
+    /// The bytes that a data URI is, or that are in a file beside it.
+    pub(super) fn of_uri(&mut self, uri: &str, place: &str) -> Result<Vec<u8>, ModelError> {
+        match uri.strip_prefix("data:") {
+            Some(data) => decoded(data, place),
+            None => self.read(uri, place),
+        }
+    }
+
+    /// The bytes of a part of a buffer.
+    pub(super) fn of_view(&self, document: &Document, view: usize) -> Result<&[u8], ModelError> {
+        let views = &document.buffer_views;
+        let place = format!("bufferViews[{view}]");
+        let view = views.get(view).ok_or_else(|| missing(&place, views.len()))?;
+        let buffer = self
+            .get(view.buffer)
+            .ok_or_else(|| missing(&format!("{place}.buffer = {}", view.buffer), self.len()))?;
+        buffer.get(view.byte_offset..).and_then(|rest| rest.get(..view.byte_length)).ok_or_else(|| {
+            let found = format!("{} bytes from byte {}", view.byte_length, view.byte_offset);
+            wrong(place, found, &format!("a part of a buffer of {} bytes", buffer.len()))
+        })
+    }
+
     /// Of all files beside it.
     pub(super) fn bytes_beside(&self) -> usize {
         self.bytes_beside
     }
 
-    fn read(&mut self, uri: &str, place: &str, beside: Option<&Path>) -> Result<Vec<u8>, ModelError> {
+    fn read(&mut self, uri: &str, place: &str) -> Result<Vec<u8>, ModelError> {
         let path = unescaped(uri);
         let is_below = !path.is_empty()
             && Path::new(&path).components().all(|part| matches!(part, Component::Normal(_)));
         let file = PathBuf::from(path);
-        let (Some(beside), true) = (beside, is_below) else {
+        let (Some(beside), true) = (self.beside, is_below) else {
             let allowed =
                 "a file beside this one or in a directory there, or a data URI; or export it as GLB";
             return Err(wrong(format!("{place}.uri"), shown(uri.as_bytes()), allowed));

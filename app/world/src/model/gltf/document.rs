@@ -20,6 +20,10 @@ pub(super) struct Document {
     pub(super) nodes: Vec<Node>,
     pub(super) meshes: Vec<Mesh>,
     pub(super) materials: Vec<Material>,
+    /// These three only matter to eyes: whoever reads them minds what they are.
+    pub(super) textures: Value,
+    pub(super) images: Value,
+    pub(super) samplers: Value,
     pub(super) accessors: Vec<Accessor>,
     pub(super) buffer_views: Vec<BufferView>,
     pub(super) buffers: Vec<Buffer>,
@@ -67,12 +71,14 @@ pub(super) struct Primitive {
 }
 
 #[derive(Deserialize, Default)]
-#[serde(default)]
+#[serde(rename_all = "camelCase", default)]
 pub(super) struct Material {
     pub(super) name: Name,
+    pub(super) pbr_metallic_roughness: Value,
+    pub(super) alpha_mode: Name,
 }
 
-/// Of a node, a mesh or a material; whatever is no text is none.
+/// Of a node, a mesh or a material, or its mode; whatever is no text is none.
 #[derive(Deserialize, Default)]
 #[serde(from = "serde_json::Value")]
 pub(super) struct Name(pub(super) Option<String>);
@@ -88,6 +94,10 @@ impl From<Value> for Name {
 pub(super) struct Attributes {
     #[serde(rename = "POSITION")]
     pub(super) position: Option<usize>,
+    #[serde(rename = "TEXCOORD_0")]
+    pub(super) uv_0: Value,
+    #[serde(rename = "TEXCOORD_1")]
+    pub(super) uv_1: Value,
 }
 
 #[derive(Deserialize, Default)]

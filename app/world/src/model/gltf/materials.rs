@@ -1,0 +1,195 @@
+//! Materials of a glTF file, as far as they are colours and pictures of faces.
+//!
+//! Model: base colours of the metallic-roughness model, with their textures; what is wrong with one leaves it out and says
+//! so, since it is nothing that a finger feels. How metallic or rough, normal maps and lights are passed over.
+
+use std::sync::Arc;
+
+use serde::Deserialize;
+use serde::de::DeserializeOwned;
+use serde_json::Value;
+
+use super::buffers::Buffers;
+use super::document::{Document, Material};
+use crate::model::appearance::Finish;
+use crate::model::texture::{Texture, Wrap};
+
+/// The finishes of a file's materials, and one more for faces of none.
+pub(super) struct Materials {
+    pub(super) finishes: Vec<Finish>,
+    /// Of each material, how its texture lies on faces.
+    lies: Vec<Option<Lie>>,
+    pub(super) unread: Vec<String>,
+    texels_left: usize,
+}
+
+/// Of all pictures of a file together: half a gigabyte.
+const MOST_TEXELS: usize = 1 << 27;
+
+/// Which texture coordinates, and what is done to them.
+#[derive(Clone, Copy)]
+pub(super) struct Lie {
+    pub(super) set: usize,
+    offset: [f64; 2],
+    turn_rad: f64,
+    scale: [f64; 2],
+}
+
+impl Lie {
+    pub(super) fn placed(&self, [u, v]: [f64; 2]) -> [f64; 2] {
+        let (sin, cos) = self.turn_rad.sin_cos();
+        let [u, v] = [u * self.scale[0], v * self.scale[1]];
+        [self.offset[0] + cos * u + sin * v, self.offset[1] - sin * u + cos * v]
+    }
+}
+
+#[derive(Deserialize, Default)]
+#[serde(rename_all = "camelCase", default)]
+struct Pbr {
+    base_color_factor: Option<[f64; 4]>,
+    base_color_texture: Option<TextureInfo>,
+}
+
+#[derive(Deserialize, Default)]
+#[serde(rename_all = "camelCase", default)]
+struct TextureInfo {
+    index: usize,
+    tex_coord: usize,
+    extensions: Extensions,
+}
+
+#[derive(Deserialize, Default)]
+#[serde(default)]
+struct Extensions {
+    #[serde(rename = "KHR_texture_transform")]
+    transform: Option<Transform>,
+}
+
+#[derive(Deserialize, Default)]
+#[serde(rename_all = "camelCase", default)]
+struct Transform {
+    offset: Option<[f64; 2]>,
+    rotation: f64,
+    scale: Option<[f64; 2]>,
+    tex_coord: Option<usize>,
+}
+
+#[derive(Deserialize, Default)]
+#[serde(default)]
+struct TextureOf {
+    source: Option<usize>,
+    sampler: Option<usize>,
+}
+
+#[derive(Deserialize, Default)]
+#[serde(rename_all = "camelCase", default)]
+struct Image {
+    uri: Option<String>,
+    buffer_view: Option<usize>,
+}
+
+#[derive(Deserialize, Default)]
+#[serde(rename_all = "camelCase", default)]
+struct Sampler {
+    wrap_s: u32,
+    wrap_t: u32,
+}
+
+/// An element of a list of the document; what is not as the format has it is as if it said nothing.
+fn element<T: DeserializeOwned + Default>(list: &Value, index: usize) -> T {
+    list.get(index).and_then(|value| T::deserialize(value).ok()).unwrap_or_default()
+}
+
+impl Materials {
+    pub(super) fn read(document: &Document, buffers: &mut Buffers<'_>) -> Self {
+        let mut read =
+            Self { finishes: Vec::new(), lies: Vec::new(), unread: Vec::new(), texels_left: MOST_TEXELS };
+        let mut images: Vec<(usize, [Wrap; 2], Option<Arc<Texture>>)> = Vec::new();
+        for material in &document.materials {
+            let pbr = Pbr::deserialize(&material.pbr_metallic_roughness).unwrap_or_default();
+            let info = pbr.base_color_texture.as_ref();
+            let texture = info.and_then(|info| read.texture(info.index, document, buffers, &mut images));
+            let lie = texture.as_ref().and(info).map(TextureInfo::lie);
+            let says_nothing = pbr.base_color_factor.is_none() && texture.is_none();
+            let colour = (!says_nothing).then(|| colour(pbr.base_color_factor.unwrap_or([1.0; 4]), material));
+            read.finishes.push(Finish { colour, texture });
+            read.lies.push(lie);
+        }
+        read.finishes.push(Finish::default());
+        read
+    }
+
+    /// The finish of a primitive's faces, and how its texture lies there.
+    pub(super) fn of(&self, material: Option<usize>) -> (u32, Option<Lie>) {
+        let none = self.lies.len();
+        let index = material.filter(|index| *index < none).unwrap_or(none);
+        (index as u32, self.lies.get(index).copied().flatten())
+    }
+
+    fn texture(
+        &mut self,
+        index: usize,
+        document: &Document,
+        buffers: &mut Buffers<'_>,
+        images: &mut Vec<(usize, [Wrap; 2], Option<Arc<Texture>>)>,
+    ) -> Option<Arc<Texture>> {
+        let of: TextureOf = element(&document.textures, index);
+        let source = of.source?;
+        let sampler = of.sampler.map(|sampler| element::<Sampler>(&document.samplers, sampler));
+        let sampler = sampler.unwrap_or_default();
+        let wraps = [sampler.wrap_s, sampler.wrap_t].map(|wrap| match wrap {
+            33071 => Wrap::Edge,
+            33648 => Wrap::Mirror,
+            _ => Wrap::Repeat,
+        });
+        if let Some((.., known)) = images.iter().find(|(of, by, _)| (*of, *by) == (source, wraps)) {
+            return known.clone();
+        }
+        let image: Image = element(&document.images, source);
+        let place = format!("images[{source}]");
+        let bytes = match (&image.uri, image.buffer_view) {
+            (Some(uri), _) => buffers.of_uri(uri, &place).map(Some),
+            (None, Some(view)) => buffers.of_view(document, view).map(|bytes| Some(bytes.to_vec())),
+            _ => Ok(None),
+        };
+        let read = bytes.map_err(|error| error.to_string()).and_then(|bytes| {
+            let read = Texture::read(&bytes.unwrap_or_default());
+            read.map_err(|found| format!("{place}: found {found}; allowed: a PNG or JPEG file"))
+        });
+        let read = read.and_then(|texture| match self.texels_left.checked_sub(texture.texels.len()) {
+            Some(left) => {
+                self.texels_left = left;
+                Ok(texture)
+            }
+            None => Err(format!(
+                "{place}: found more than {MOST_TEXELS} places in all pictures; allowed: so many"
+            )),
+        });
+        let read = read.map_err(|said| self.unread.push(said)).ok();
+        let texture = read.map(|texture| Arc::new(Texture { wraps, ..texture }));
+        images.push((source, wraps, texture.clone()));
+        texture
+    }
+}
+
+impl TextureInfo {
+    fn lie(&self) -> Lie {
+        let transform = self.extensions.transform.as_ref();
+        Lie {
+            set: transform.and_then(|transform| transform.tex_coord).unwrap_or(self.tex_coord),
+            offset: transform.and_then(|transform| transform.offset).unwrap_or_default(),
+            turn_rad: transform.map_or(0.0, |transform| transform.rotation),
+            scale: transform.and_then(|transform| transform.scale).unwrap_or([1.0; 2]),
+        }
+    }
+}
+
+/// Of a share of light's power, what it looks like: as a scene's colours are.
+fn colour([r, g, b, opacity]: [f64; 4], material: &Material) -> [f64; 4] {
+    let seen = |share: f64| {
+        let share = share.clamp(0.0, 1.0);
+        if share <= 0.003_130_8 { 12.92 * share } else { 1.055 * share.powf(1.0 / 2.4) - 0.055 }
+    };
+    let is_clear = material.alpha_mode.0.as_deref() == Some("BLEND");
+    [seen(r), seen(g), seen(b), if is_clear { opacity.clamp(0.0, 1.0) } else { 1.0 }]
+}
