@@ -157,7 +157,11 @@ impl Parts {
         let opened = match window {
             Some(spec) => {
                 let carries_devices = rig.goes_with_the_camera();
-                open_window(&WindowSpec { carries_devices, ..spec.clone() }, shown(), reins)?
+                let shown = shown();
+                for line in &shown.stage.not_drawn {
+                    say(format_args!("phantom3: not in the window: {line}"));
+                }
+                open_window(&WindowSpec { carries_devices, ..spec.clone() }, shown, reins)?
             }
             None if reins.is_some() => return Err(NoWindow::NoDisplay.into()),
             None => None,

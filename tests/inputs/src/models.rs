@@ -8,8 +8,8 @@ use haptics::{Nurbs, NurbsPatch, Surface};
 use nalgebra::Vector3;
 use std::path::Path;
 use world::model::{
-    ModelError, line_of_face, read_ase, read_free_form, read_gltf, read_obj, read_obj_with_uv, read_patches,
-    read_ply, read_stl, read_three_ds, write_patches,
+    ModelError, Texture, line_of_face, read_appearance, read_ase, read_free_form, read_gltf, read_obj,
+    read_obj_with_uv, read_patches, read_ply, read_stl, read_three_ds, write_patches,
 };
 use world::picture;
 
@@ -37,7 +37,16 @@ pub fn ply(bytes: &[u8]) {
 
 /// A glTF, text or binary, that may name no file.
 pub fn gltf(bytes: &[u8]) {
-    build(read_gltf(bytes, None));
+    let read = read_gltf(bytes, None);
+    // In a directory that is not there.
+    if let (Ok(soup), Ok(Some(looks))) = (&read, read_appearance(Path::new("none/a.glb"), bytes)) {
+        let count = soup.faces.len();
+        assert!(looks.of_face.len() == count && looks.uv.len() == count, "a face without looks");
+        let is_there = |finish: &u32| (*finish as usize) < looks.finishes.len();
+        assert!(looks.of_face.iter().all(is_there), "a finish that is not there");
+        looks.unread.iter().for_each(|said| check_message(said));
+    }
+    build(read);
 }
 
 /// An ASE.
@@ -64,6 +73,12 @@ pub fn patches_obj(bytes: &[u8]) {
 pub fn png(bytes: &[u8]) {
     if let Err(error) = picture::read_png(bytes) {
         check_message(&error.to_string());
+    }
+    match Texture::read(bytes) {
+        Ok(Texture { size: [columns, rows], texels, .. }) => {
+            assert!(columns <= 4096 && rows <= 4096 && texels.len() == (columns * rows) as usize);
+        }
+        Err(said) => check_message(&said),
     }
 }
 
