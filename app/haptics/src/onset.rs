@@ -7,8 +7,9 @@
 //!
 //! Model: the force of a contact that begins inside ramps in, and the spring is no longer than the overlap, with what the HIP
 //! has moved since, in the entity's frame. The overlap is a lower bound of the way out that every shape knows. As soon as
-//! the spring and the way to the god-object are within this bound, the bound is dropped. From there on the god-object only follows: it is never farther from
-//! the HIP than a tick ago, but for what the HIP has moved. A tick in which it is brings the bound back, and is told.
+//! the spring and the way to the god-object are within this bound, the bound is dropped. From there on the god-object only
+//! follows: it is never farther from the HIP than a tick ago, but for what the HIP has moved. A tick in which it is brings the
+//! bound back, and is told.
 //!
 //! A god-object that did not come to rest within its tick's work, or that flies from one part to the next, bears less than
 //! its spring. Where it comes to rest all of the spring would be back at once, after a tick without any: the force grows by

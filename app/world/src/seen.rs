@@ -181,6 +181,9 @@ impl<'s> Seen<'s> {
     }
 }
 
+/// Each is drawn by itself.
+const MOST_MATERIALS: usize = 1000;
+
 /// The faces of a material.
 struct Finished {
     soup: Arc<TriangleSoup>,
@@ -190,6 +193,9 @@ struct Finished {
 
 /// The faces of each material that says how they look; and what could not be read of that.
 fn finished(file: &Path, whole: &TriangleSoup) -> (Vec<Finished>, Vec<String>) {
+    if !model::may_have_appearance(file) {
+        return (Vec::new(), Vec::new());
+    }
     let read = model::read_file(file).and_then(|bytes| model::read_appearance(file, &bytes));
     let Appearance { finishes, of_face, uv, unread } = match read {
         Ok(Some(told)) if told.is_told() && told.of_face.len() == whole.faces.len() => told,
@@ -198,9 +204,16 @@ fn finished(file: &Path, whole: &TriangleSoup) -> (Vec<Finished>, Vec<String>) {
     };
     let mut faces = vec![Vec::new(); finishes.len()];
     of_face.iter().enumerate().for_each(|(face, finish)| faces[*finish as usize].push(face));
+    let count = faces.iter().filter(|faces| !faces.is_empty()).count();
+    if count > MOST_MATERIALS {
+        let said =
+            format!("found {count} materials with faces; allowed: {MOST_MATERIALS} at most, to be seen");
+        return (Vec::new(), vec![said]);
+    }
+    let mut numbers = vec![None; whole.vertices.len()];
     let parts = finishes.into_iter().zip(faces).filter(|(_, faces)| !faces.is_empty());
     let parts = parts.map(|(finish, faces)| Finished {
-        soup: Arc::new(used(whole, faces.iter().map(|&face| whole.faces[face]))),
+        soup: Arc::new(used(whole, faces.iter().map(|&face| whole.faces[face]), &mut numbers)),
         colour: finish.colour,
         painting: finish
             .texture
@@ -218,23 +231,28 @@ fn parts(file: &Path, whole: &Arc<TriangleSoup>, names: &[&[String]]) -> Vec<Arc
     }
     let part = |label: usize| {
         let own = whole.faces.iter().zip(&labels).filter(|(_, own)| usize::from(**own) == label);
-        Arc::new(used(whole, own.map(|(face, _)| *face)))
+        Arc::new(used(whole, own.map(|(face, _)| *face), &mut vec![None; whole.vertices.len()]))
     };
     (0..=names.len()).map(part).collect()
 }
 
-/// These faces of a soup, with the vertices that they use.
-fn used(of: &TriangleSoup, faces: impl Iterator<Item = [u32; 3]>) -> TriangleSoup {
-    let mut numbers = vec![None; of.vertices.len()];
-    let mut vertices = Vec::new();
+/// These faces of a soup, with the vertices that they use. `numbers`: a place for each vertex of the soup, empty before and
+/// after.
+fn used(
+    of: &TriangleSoup,
+    faces: impl Iterator<Item = [u32; 3]>,
+    numbers: &mut [Option<u32>],
+) -> TriangleSoup {
+    let mut own = Vec::new();
     let faces = faces.map(|face| {
         face.map(|vertex| {
             *numbers[vertex as usize].get_or_insert_with(|| {
-                vertices.push(of.vertices[vertex as usize]);
-                vertices.len() as u32 - 1
+                own.push(vertex);
+                own.len() as u32 - 1
             })
         })
     });
     let faces = faces.collect();
-    TriangleSoup { vertices, faces }
+    own.iter().for_each(|&vertex| numbers[vertex as usize] = None);
+    TriangleSoup { vertices: own.iter().map(|&vertex| of.vertices[vertex as usize]).collect(), faces }
 }
