@@ -18,6 +18,7 @@ use crate::outputs;
 use crate::rig::{HandMode, Problems, Rig};
 use crate::settings;
 use clap::Args;
+use io_driver::arguments::shortened;
 use io_driver::config::period_of;
 use measures::Measures;
 use rt_core::plain_text::PlainJson;
@@ -104,7 +105,7 @@ pub fn execute(args: &CheckArgs, settings: &Settings) -> ExitCode {
     let said = if args.json {
         format!("{}\n", PlainJson(format_args!("{:#}", to_json(&checked))))
     } else {
-        report::text(&checked, &args.scene)
+        shortened(report::text(&checked, &args.scene))
     };
     outputs::print(&said);
     ExitCode::from(if checked.problems.is_empty() { 0 } else { 2 })

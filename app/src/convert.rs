@@ -7,7 +7,7 @@ use crate::outputs::{self, Output};
 use clap::Args;
 use io_driver::say::say;
 use rt_core::plain_text::beginning;
-use rt_core::{input_file, replacement};
+use rt_core::{input_file, limits, replacement};
 use std::path::{Path, PathBuf};
 use world::MAX_FILE_BYTES;
 use world::thesis::{Conversion, Converted, ObjectFile, ObjectKind, read_list, read_object};
@@ -43,16 +43,26 @@ pub fn execute(args: &ConvertArgs) -> Result<Stop, RunFailure> {
         say(format_args!("phantom3: {told}"));
     }
     match &args.out {
-        Some(out) => replacement::write(out, &converted.toml)
-            .map_err(|error| RunFailure::Start(format!("cannot write {}: {error}", out.display())))?,
+        Some(out) => replacement::write(out, &converted.toml).map_err(|error| not_written(out, &error))?,
         None => outputs::print(&converted.toml),
     }
     Ok(Stop::Finished)
 }
 
+fn not_written(out: &Path, error: &std::io::Error) -> RunFailure {
+    let why = limits::with_remedy_or(error, "name a file in a directory that exists and can be written");
+    RunFailure::Results(format!("cannot write {}: {why}", out.display()))
+}
+
 /// The scene; what is read for it besides the list joins the inputs.
 fn convert(args: &ConvertArgs, inputs: &mut Vec<PathBuf>) -> Result<Converted, RunFailure> {
     let text = read(&args.file)?;
+    if text.lines().all(|line| line.split("//").next().is_none_or(|words| words.trim().is_empty())) {
+        return Err(RunFailure::Start(format!(
+            "{}: found nothing but comments and empty lines; expected a list of objects, or keys and values of one",
+            args.file.display()
+        )));
+    }
     let meshes = args.meshes.as_ref().map_or_else(String::new, |dir| format!("{}/", dir.display()));
     if text.lines().any(|line| line.split("//").next().is_some_and(|words| words.contains('='))) {
         let object = parsed(&args.file, &text)?;

@@ -25,14 +25,19 @@ pub(crate) fn words(driver: &DriverView, socket: &Path) -> Option<String> {
         return None;
     }
     let command = names.iter().fold("io-driver zero".to_owned(), |line, name| line + " --device " + name);
-    let place = if socket == endpoint::for_application() {
-        String::new()
-    } else {
-        format!(" --socket {}", socket.display())
-    };
+    let place = place(socket);
     Some(format!(
         "the driver does not know yet where its device {} is, and until then no device gets force; \
          bring it into its zeroing pose, then `{command}{place}` (or `phantom3 driver zero ...`)",
         names.join(", nor where its device ")
     ))
+}
+
+/// Option that names the driver at this socket to `io-driver`; empty where it finds that by itself.
+pub(crate) fn place(socket: &Path) -> String {
+    if socket == endpoint::for_application() {
+        String::new()
+    } else {
+        format!(" --socket {}", socket.display())
+    }
 }

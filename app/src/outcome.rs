@@ -1,5 +1,6 @@
 //! How a run can end.
 
+use crate::not_zeroed;
 use crate::plausible::Implausible;
 use crate::recording::RecordingError;
 use io_driver::open::OpenError;
@@ -8,6 +9,7 @@ use shm_abi::FaultReason;
 use shm_abi::client::AttachError;
 use shm_abi::segment::SegmentError;
 use std::borrow::Cow;
+use std::path::Path;
 use std::process::ExitCode;
 use thiserror::Error;
 use view::NoWindow;
@@ -55,6 +57,17 @@ pub enum RunFailure {
     /// The driver is in its fault state.
     #[error("the driver is in its fault state: {0}; the motors are off")]
     DriverFault(Cow<'static, str>),
+    /// The driver that somebody runs is in its fault state.
+    #[error(
+        "the driver is in its fault state: {why}; the motors are off; find the cause, then `io-driver clear-fault{place}` (or \
+         `phantom3 driver clear-fault ...`), and start a new run"
+    )]
+    RunningDriverFault {
+        /// The fault.
+        why: Cow<'static, str>,
+        /// Option that names the driver, where it needs one.
+        place: String,
+    },
     /// The driver is gone.
     #[error("the driver is gone: {0}")]
     DriverGone(String),
@@ -97,20 +110,16 @@ impl RunFailure {
         Self::DriverFault(FaultReason::sentence_for(word))
     }
 
+    /// The same of a driver that somebody runs at this socket: it goes on, and its fault stays.
+    pub fn driver_fault_at(word: u64, socket: &Path) -> Self {
+        Self::RunningDriverFault { why: FaultReason::sentence_for(word), place: not_zeroed::place(socket) }
+    }
+
     /// The exit status of the run contract: 2 nothing was started, 3 a fault during the run.
     pub fn exit_status(&self) -> u8 {
         match self {
-            Self::Start(_)
-            | Self::NoWindow(_)
-            | Self::Attach(_)
-            | Self::Segment(_)
-            | Self::Device(_)
-            | Self::Recording(
-                RecordingError::Create { .. }
-                | RecordingError::NoThread { .. }
-                | RecordingError::Claimed { .. }
-                | RecordingError::Format(_),
-            ) => 2,
+            Self::Start(_) | Self::NoWindow(_) | Self::Attach(_) | Self::Segment(_) | Self::Device(_) => 2,
+            Self::Recording(error) if error.is_of_the_start() => 2,
             _ => 3,
         }
     }

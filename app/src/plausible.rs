@@ -68,7 +68,8 @@ pub enum Implausible {
     },
     /// The frame is due later than now.
     #[error(
-        "its frame of tick {tick} comes from the future: it is due in {ahead_ms} ms, expected {most_ms} ms at most"
+        "its frame of tick {tick} comes from the future: it is due in {ahead_ms} ms, expected {most_ms} ms at most \
+         (across time namespaces, `unshare -T`, clocks differ)"
     )]
     Future {
         /// The tick.

@@ -66,6 +66,9 @@ pub enum RecordingError {
         /// The system's error.
         source: io::Error,
     },
+    /// The same of a file of events.
+    #[error("{}", .0.to_string().replacen("the recording", "the file of events", 1))]
+    OfEvents(Box<RecordingError>),
     /// It cannot be written any further.
     #[error(
         "cannot write the recording {file}: {source}; the run goes on without it; it is complete up to t = {until_s} s ({rows} rows)"
@@ -83,6 +86,24 @@ pub enum RecordingError {
 }
 
 impl RecordingError {
+    /// The same, told of a file of events.
+    pub(crate) fn of_events(self) -> Self {
+        Self::OfEvents(Box::new(self))
+    }
+
+    /// What went wrong, of whichever kind of file.
+    pub fn cause(&self) -> &Self {
+        if let Self::OfEvents(error) = self { error.cause() } else { self }
+    }
+
+    /// Whether nothing was recorded yet.
+    pub fn is_of_the_start(&self) -> bool {
+        matches!(
+            self.cause(),
+            Self::Create { .. } | Self::NoThread { .. } | Self::Claimed { .. } | Self::Format(_)
+        )
+    }
+
     /// The file that it is about.
     pub fn file(&self) -> &Path {
         match self {
@@ -92,6 +113,7 @@ impl RecordingError {
             | Self::Removed { file, .. }
             | Self::NotBegun { file, .. }
             | Self::Write { file, .. } => file,
+            Self::OfEvents(error) => error.file(),
             Self::Format(FormatError::Unknown { file, .. } | FormatError::ParquetOfRun { file, .. }) => file,
         }
     }
@@ -99,7 +121,7 @@ impl RecordingError {
     /// Whether nobody reads the standard output any more: who has seen enough is no failure.
     pub fn is_of_a_reader_who_left(&self) -> bool {
         let is_pipe = |file: &Path| file == shown(Path::new(STANDARD_OUTPUT));
-        matches!(self, Self::Write { file, source, .. } if source.kind() == io::ErrorKind::BrokenPipe && is_pipe(file))
+        matches!(self.cause(), Self::Write { file, source, .. } if source.kind() == io::ErrorKind::BrokenPipe && is_pipe(file))
     }
 }
 

@@ -31,10 +31,11 @@ use io_driver::open::open_devices_with;
 use io_driver::say::say;
 use physics::Reason;
 use rt_core::signals::StopSignals;
+use rt_core::time_namespace;
 use shm_abi::client;
 use shm_abi::segment::{ClockMode, DriverInfo};
 use shm_abi::{CommanderMemory, DriverView, Frame};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::mpsc::{self, Receiver};
 use std::time::Duration;
 use view::{NoWindow, OpenWindow, Reins, WindowSpec};
@@ -378,6 +379,7 @@ fn connect(
     match &plan.attach {
         Some(Attach { socket, grace }) => {
             let attachment = client::command(socket, "phantom3")?;
+            refuse_other_clock(socket, attachment.driver_pid)?;
             Ok((Source::Running { socket: socket.clone(), grace: *grace }, attachment))
         }
         None => {
@@ -389,6 +391,18 @@ fn connect(
             Ok((Source::Child(child), attachment))
         }
     }
+}
+
+/// Deadlines mean nothing across time namespaces.
+fn refuse_other_clock(socket: &Path, driver_pid: u64) -> Result<(), RunFailure> {
+    if time_namespace::is_clock_shared_with(driver_pid) != Some(false) {
+        return Ok(());
+    }
+    Err(RunFailure::Start(format!(
+        "the driver at {} (process {driver_pid}) lives in another time namespace, and its clock differs from this program's; \
+         start both in one (without `unshare -T` and the like)",
+        socket.display()
+    )))
 }
 
 /// The child's configuration is TOML, which is UTF-8.

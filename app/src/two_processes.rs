@@ -57,6 +57,14 @@ impl Source {
             Self::Running { socket, .. } => socket,
         }
     }
+
+    /// The fault behind a word of its frame.
+    fn fault(&self, word: u64) -> RunFailure {
+        match self {
+            Self::Child(_) => RunFailure::driver_fault(word),
+            Self::Running { socket, .. } => RunFailure::driver_fault_at(word, socket),
+        }
+    }
 }
 
 /// What is known after the run.
@@ -121,7 +129,7 @@ pub fn run(
             WatchEnd::Fast(FastEnd::Finished) => Stop::Finished,
             WatchEnd::Signal(signal) | WatchEnd::Fast(FastEnd::Signal(signal)) => Stop::Signal(signal),
             WatchEnd::Closed => Stop::Closed,
-            WatchEnd::Fast(FastEnd::Fault(reason)) => return Err(RunFailure::driver_fault(reason)),
+            WatchEnd::Fast(FastEnd::Fault(reason)) => return Err(source.fault(reason)),
             WatchEnd::Fast(FastEnd::Implausible(lie)) => return Err(RunFailure::DriverImplausible(lie)),
             WatchEnd::Fast(FastEnd::Silent) => return Err(RunFailure::DriverSilent { seconds: 5.0 }),
             WatchEnd::DriverGone | WatchEnd::Fast(FastEnd::Stopped) => {

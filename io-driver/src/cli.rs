@@ -27,6 +27,7 @@ use commission::CommissionArgs;
 use emulate::EmulateArgs;
 use places::SocketArgs;
 pub use places::usual_socket;
+pub use prompt::say_line_if_late;
 use rt_core::plain_text::PlainJson;
 use shm_abi::client::{self, AttachError};
 use std::path::PathBuf;

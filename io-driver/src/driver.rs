@@ -156,8 +156,10 @@ pub fn run(config: &DriverConfig, options: &RunOptions) -> Result<(), RunError> 
     let cycle = make_cycle(config, Arc::clone(&memory), devices).telling_of_faults(sender.urgent.clone());
     let real_loop = RealLoop::new(config, waiting, cycle, inbox, log, shared.clone(), &TICK);
     // From here on nothing new that the loop touches: it would not be locked.
-    let path = options.socket.clone().or_else(|| config.socket.clone());
-    let path = path.unwrap_or_else(shm_abi::endpoint::for_driver);
+    let named = options.socket.clone().or_else(|| config.socket.clone()).or_else(shm_abi::endpoint::named);
+    // The usual places may be made without a word; a name that is mistyped is told by what it makes.
+    let missing = named.as_deref().and_then(missing_directory);
+    let path = named.unwrap_or_else(shm_abi::endpoint::for_driver);
     give_up_rights(user.as_ref(), &path, &mut report, &starter)?;
     if user.is_some() {
         // The kernel forgets the request when the user changes.
@@ -169,6 +171,9 @@ pub fn run(config: &DriverConfig, options: &RunOptions) -> Result<(), RunError> 
     }
     let rights = config.access.resolve().map_err(RunError::Access)?;
     let server = Server::bind_for(&path, rights)?;
+    if let Some(directory) = missing {
+        say(options, format_args!("made the directory {} for the socket", directory.display()));
+    }
     // The last threads: the sandbox lets none be started.
     let no_thread = |what| move |source| RunError::NoThread { what, source };
     let (stop_socket, stop_file) = StopSocket::bind(server.path())?;
@@ -187,6 +192,12 @@ pub fn run(config: &DriverConfig, options: &RunOptions) -> Result<(), RunError> 
     let service =
         Service { server, stop_file, sender, lost, memory, signals, heartbeat, shared, options, supervisor };
     service.run(thread)
+}
+
+/// The directory of a socket, if it is not there.
+fn missing_directory(socket: &Path) -> Option<PathBuf> {
+    let directory = socket.parent().filter(|directory| !directory.as_os_str().is_empty())?;
+    directory.symlink_metadata().is_err().then(|| directory.to_path_buf())
 }
 
 /// Makes this process end with its parent, if it is to.

@@ -9,6 +9,7 @@
 //! `log_thread` writes them.
 //! Invariant: once the log's thread is there, [`say`] never waits; a line that finds the queue full is counted.
 
+use crate::arguments;
 use rt_core::plain_text::PlainLines;
 use std::fmt;
 use std::io::Write;
@@ -73,7 +74,7 @@ pub fn tell(line: fmt::Arguments<'_>) {
 
 /// In one piece, with its end.
 fn indented(text: fmt::Arguments<'_>) -> String {
-    let text = PlainLines(text).to_string();
+    let text = arguments::shortened(PlainLines(text).to_string());
     let mut lines = text.lines();
     let mut out = lines.next().unwrap_or_default().to_owned();
     for line in lines {

@@ -3,6 +3,7 @@
 use crate::meter;
 use rt_core::clock::monotonic_ns;
 use rt_core::histogram::{Histogram, Summary};
+use rt_core::time_namespace;
 use serde::Serialize;
 use shm_abi::frame::{
     DEVICE_NOT_ZEROED, DEVICE_ORIENTATION_MEASURED, DEVICE_POSITION_VALID, INPUT_DEAD_MAN_HELD,
@@ -14,6 +15,7 @@ use shm_abi::{DriverState, DriverView, FaultReason, Frame};
 use std::borrow::Cow;
 use std::fmt;
 use std::sync::atomic::Ordering;
+use std::time::Duration;
 
 /// A driver at one moment. Units are in the names.
 #[derive(Debug, Clone, Serialize)]
@@ -34,6 +36,8 @@ pub struct Status {
     pub tick: Option<u64>,
     /// Age of that tick (s), if a loop in real time should have had others since: it hangs, or is stopped.
     pub silent_for_s: Option<f64>,
+    /// Whether its clock is shifted against ours, so that ages are not known: one of us lives in another time namespace.
+    pub other_time_namespace: bool,
     /// State of the driver.
     pub state: &'static str,
     /// Why it is in the fault state.
@@ -176,6 +180,7 @@ impl Status {
     pub fn of(driver: &DriverView, driver_pid: u64) -> Self {
         let info = driver.info();
         let frame = driver.read_latest();
+        let has_other_clock = frame.is_some_and(|frame| has_other_clock(driver, &info, &frame, driver_pid));
         let fault = frame.map(|f| f.fault).filter(|word| *word != FaultReason::None as u64);
         let inputs = frame.map_or(0, |f| f.inputs);
         Self {
@@ -186,7 +191,10 @@ impl Status {
             wait: info.wait_mode.name(),
             cpu: info.cpu,
             tick: frame.map(|f| f.tick),
-            silent_for_s: frame.and_then(|f| silence_s(&info, &f, monotonic_ns())),
+            silent_for_s: frame
+                .filter(|_| !has_other_clock)
+                .and_then(|f| silence_s(&info, &f, monotonic_ns())),
+            other_time_namespace: has_other_clock,
             state: frame.map_or(DriverState::Starting.name(), |f| state_name(f.state)),
             fault: fault.map(FaultReason::sentence_for),
             lease: frame.map_or(0, |f| f.lease),
@@ -322,6 +330,9 @@ impl fmt::Display for Status {
         )?;
         match self.silent_for_s {
             Some(s) => writeln!(f, "; all of this was so {s:.1} s ago, its loop has had no tick since")?,
+            None if self.other_time_namespace => {
+                writeln!(f, "; how old this is is not known: the driver lives in another time namespace")?;
+            }
             None => writeln!(f)?,
         }
         let c = &self.counters;
@@ -390,6 +401,35 @@ fn silence_s(info: &DriverInfo, frame: &Frame, now_ns: u64) -> Option<f64> {
     is_silent.then_some(age_ns as f64 / 1e9)
 }
 
+/// Whether the driver's clock is shifted against ours. Where the kernel does not tell, frames do: one of the future, or
+/// another one that is old when it is new.
+fn has_other_clock(driver: &DriverView, info: &DriverInfo, frame: &Frame, driver_pid: u64) -> bool {
+    if let Some(is_shared) = time_namespace::is_clock_shared_with(driver_pid) {
+        return !is_shared;
+    }
+    let now_ns = monotonic_ns();
+    if frame.read_ns > now_ns + AHEAD_NS {
+        return true;
+    }
+    if silence_s(info, frame, now_ns).is_none() {
+        return false;
+    }
+    let until_ns = now_ns + NEXT_FRAME_NS + 5 * info.period_ns;
+    while monotonic_ns() < until_ns {
+        let next = driver.read_latest().filter(|next| next.tick > frame.tick);
+        if let Some(next) = next {
+            return silence_s(info, &next, monotonic_ns()).is_some();
+        }
+        std::thread::sleep(Duration::from_millis(1));
+    }
+    false
+}
+
+/// No frame is read so far in the future.
+const AHEAD_NS: u64 = 1_000_000_000;
+/// A loop that ticks has another frame by then.
+const NEXT_FRAME_NS: u64 = 20_000_000;
+
 /// Time without a tick, beyond a few periods, that a busy machine does not explain.
 const SILENCE_NS: u64 = 100_000_000;
 
@@ -414,6 +454,21 @@ mod tests {
         assert!(status.contains(line), "{status}");
     }
 
+    /// Of process 0 the kernel tells nothing.
+    #[test]
+    fn a_frame_of_the_future_is_of_another_clock_and_has_no_age() {
+        let config = DriverConfig::parse("[[device]]\nbackend = \"ideal\"\n", "test.toml".as_ref()).unwrap();
+        let devices = crate::open::open_devices(&config).unwrap();
+        let memory = DriverMemory::create(&describe(&config, &devices, WaitMode::Futex)).unwrap();
+        for (ahead_ns, is_other) in [(10_000_000_000, true), (0, false)] {
+            memory.write_frame(&Frame { read_ns: monotonic_ns() + ahead_ns, ..Frame::zeroed() });
+            memory.ring(0, None);
+            let status = Status::of(&DriverView::map(memory.fd()).unwrap(), 0);
+            assert_eq!((status.other_time_namespace, status.silent_for_s), (is_other, None));
+            assert_eq!(status.to_string().contains("lives in another time namespace"), is_other);
+        }
+    }
+
     /// A loop that hangs leaves its last frame, which says that it pushes.
     #[test]
     fn a_frame_of_before_is_told_as_such_where_a_loop_should_tick() {
@@ -429,6 +484,7 @@ mod tests {
         };
         const S: u64 = 1_000_000_000;
         let (told, line) = text_of("real", 3 * S);
+        assert!(!told.contains("time namespace"), "{told}");
         assert!(told.contains("; all of this was so 3.0 s ago, its loop has had no tick since"), "{told}");
         assert!(line.starts_with("tick 0 (3.0 s ago) "), "{line}");
         // Far less than 100 ms and five periods of 10 ms; a loop in lockstep waits as long as its commander.

@@ -53,6 +53,14 @@ pub enum TableError {
         /// Where.
         at: Place,
     },
+    /// Lines of old Macintoshes.
+    #[error("{at}: {words}")]
+    Ends {
+        /// Where.
+        at: Place,
+        /// What is wrong, and what to do.
+        words: &'static str,
+    },
     /// The first column is not the time.
     #[error("{at}: found the first column {found}, allowed: `t`, the time in seconds{hint}")]
     NoTime {
@@ -207,6 +215,9 @@ impl<'a> TableReader<'a> {
     }
 
     fn check_header(&self, empty: bool) -> Result<(), TableError> {
+        if let Some(words) = separators::mistaken_ends(&self.header.join(",")) {
+            return Err(TableError::Ends { at: self.place(1, ""), words });
+        }
         if empty {
             return Err(TableError::Empty { at: self.place(1, "") });
         }

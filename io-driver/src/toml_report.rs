@@ -201,7 +201,9 @@ fn in_words(message: &str) -> String {
         "a sequence" => "a list, as in [1, 2]",
         _ => return message.to_owned(),
     };
-    format!("{found}, expected {words}")
+    let text = found.strip_prefix("invalid type: string \"").and_then(|text| text.strip_suffix('"'));
+    let hint = text.filter(|_| words.contains("number")).map_or_else(String::new, toml_slips::hint_for_text);
+    format!("{found}, expected {words}{hint}")
 }
 
 /// Of "unknown field `nmae`, expected one of `name`, `mass_kg`" and the like, the word that was meant.
@@ -378,7 +380,12 @@ mod tests {
         }
         let problem =
             |text: &str| TomlText::new(text, Path::new("lab/m.toml")).read::<Numbers>().unwrap_err().problem;
-        assert_eq!(problem("size = '1 kHz'\n"), "invalid type: string \"1 kHz\", expected a number");
+        assert_eq!(
+            problem("size = '1 kHz'\n"),
+            "invalid type: string \"1 kHz\", expected a number; numbers have no units, the name of the key tells the unit"
+        );
+        assert!(problem("count = '2'\n").ends_with("; a number stands without quotes"));
+        assert!(problem("size = 1 kHz\n").starts_with("found 1 kHz, allowed: a number alone"));
         assert_eq!(
             problem("count = 'two'\n"),
             "invalid type: string \"two\", expected a whole number, 0 or more"

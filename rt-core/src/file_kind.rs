@@ -15,9 +15,11 @@ pub fn mistaken(begin: &[u8]) -> Option<&'static str> {
     KINDS.iter().find(is_kind).map(|(_, words)| *words)
 }
 
-const KINDS: [(&[u8], &str); 7] = [
+const KINDS: [(&[u8], &str); 9] = [
     (b"\x1f\x8b", "it is compressed by gzip; unpack it with gunzip"),
     (b"\xfd7zXZ\0", "it is compressed by xz; unpack it with unxz"),
+    (b"BZh", "it is compressed by bzip2; unpack it with bunzip2"),
+    (b"\x28\xb5\x2f\xfd", "it is compressed by zstd; unpack it with unzstd"),
     (b"PK\x03\x04", "it is a ZIP archive, as spreadsheets are; unpack it, or save the table as CSV"),
     (
         b"version https://git-lfs.github.com/spec/",

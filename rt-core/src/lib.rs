@@ -56,6 +56,7 @@ pub mod separators;
 pub mod setup;
 pub mod signals;
 pub mod spin_margin;
+pub mod time_namespace;
 pub mod toml_slips;
 pub mod usage;
 

@@ -40,6 +40,8 @@ pub fn remedy(error: &io::Error) -> Option<String> {
             Some(what) => raise(what),
             None => Some("end other programs, or give the machine more memory".into()),
         },
+        Errno::ENOSPC => Some("make room on that disk, or name a place on another one".into()),
+        Errno::EDQUOT => Some("delete files of yours on that disk, or name a place on another one".into()),
         _ => None,
     }
 }
@@ -66,6 +68,12 @@ pub fn more_processes() -> String {
 #[must_use]
 pub fn with_remedy(error: &io::Error) -> String {
     remedy(error).map_or_else(|| error.to_string(), |remedy| format!("{error}; {remedy}"))
+}
+
+/// The error, and what to do about it: `otherwise` where the error tells of no limit.
+#[must_use]
+pub fn with_remedy_or(error: &io::Error, otherwise: &str) -> String {
+    format!("{error}; {}", remedy(error).as_deref().unwrap_or(otherwise))
 }
 
 /// In words; `None`: memory has no limit.
@@ -98,7 +106,14 @@ mod tests {
         assert!(of(Errno::EMFILE).is_some_and(|words| words.contains("open files (`ulimit -n`")));
         assert!(of(Errno::EFBIG).is_some());
         assert!(of(Errno::ENOMEM).is_some());
+        assert!(of(Errno::ENOSPC).is_some_and(|words| words.starts_with("make room")));
         assert_eq!(of(Errno::ENOENT), None);
+        let full = io::Error::from_raw_os_error(Errno::ENOSPC as i32);
+        assert!(
+            with_remedy_or(&full, "name another")
+                .ends_with("28); make room on that disk, or name a place on another one")
+        );
+        assert!(with_remedy_or(&io::Error::other("words"), "name another").ends_with("words; name another"));
         assert_eq!(remedy(&io::Error::other("words")), None);
         let words = no_thread(&io::Error::from_raw_os_error(Errno::EAGAIN as i32));
         assert!(words.starts_with("no thread could be started (Resource temporarily unavailable"), "{words}");

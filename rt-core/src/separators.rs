@@ -4,6 +4,14 @@
 //! them by tabs. A reader that expects commas sees one long column, or twice as many cells, and complains of those.
 //! Model: nothing is guessed and read; the hint says what was probably found and what is needed.
 
+/// What to say of a text whose lines end in carriage returns alone.
+pub fn mistaken_ends(text: &str) -> Option<&'static str> {
+    let is_of_returns = text.trim_end_matches('\r').contains('\r') && !text.contains('\n');
+    is_of_returns.then_some(
+        "its lines end in carriage returns alone, as of old Macintoshes; save it with the line ends of Unix or Windows",
+    )
+}
+
 /// What to say of a first line whose columns are not separated by commas.
 pub fn hint_for_header(line: &str) -> &'static str {
     let count = |separator: char| line.matches(separator).count();
@@ -50,6 +58,14 @@ mod tests {
         assert!(hint_for_header("t\tf0_x\tf0_y").contains("it has tabs"));
         for good in ["t,f0_x,f0_y", "t, \tx", "", "time", "a;b,c,d"] {
             assert_eq!(hint_for_header(good), "", "{good:?}");
+        }
+    }
+
+    #[test]
+    fn lines_that_end_in_carriage_returns_alone_are_told_and_those_of_windows_are_not() {
+        assert!(mistaken_ends("t,x\r0,1\r").is_some_and(|words| words.contains("carriage returns")));
+        for good in ["", "t,x\r\n0,1\r\n", "t,x\n", "t", "t\r"] {
+            assert_eq!(mistaken_ends(good), None, "{good:?}");
         }
     }
 

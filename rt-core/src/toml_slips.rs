@@ -12,6 +12,7 @@ pub fn explain(text: &str, offset: usize, said: &str) -> String {
     let before = before.rsplit('\n').next().unwrap_or_default();
     let rest = rest.split(['\n', '\r']).next().unwrap_or_default();
     word_without_quotes(before, rest)
+        .or_else(|| number_with_unit(before, rest))
         .or_else(|| half_a_number(before, rest).map(str::to_owned))
         .or_else(|| backslash(before, &said).map(str::to_owned))
         .or_else(|| typographic_quotes(before, rest, &said).map(str::to_owned))
@@ -44,10 +45,55 @@ fn word_without_quotes(before: &str, rest: &str) -> Option<String> {
     let small = word.to_lowercase();
     Some(match small.as_str() {
         "true" | "false" => format!("found {word}, allowed: {small}, in small letters"),
-        "yes" | "on" => format!("found {word}, allowed: true; text stands in quotes"),
-        "no" | "off" => format!("found {word}, allowed: false; text stands in quotes"),
+        "yes" | "on" | "no" | "off" => {
+            format!("found {word}, allowed: true or false; text stands in quotes")
+        }
         _ => format!("found {word} without quotes; text stands in quotes, as in \"{word}\""),
     })
+}
+
+/// `5 mm`, `500N/m`
+fn number_with_unit(before: &str, rest: &str) -> Option<String> {
+    const MOST_CHARS: usize = 40;
+    let is_value = before.contains('=') && before.trim_end().ends_with(['=', '[', ',']);
+    let value = rest.split([',', ']', '}', '#']).next().unwrap_or_default().trim_end();
+    let is_one = is_value && value.chars().count() <= MOST_CHARS && has_unit(value);
+    is_one.then(|| format!("found {value}, allowed: a number alone; {NO_UNITS}"))
+}
+
+/// What to say of a text in quotes where a number is expected.
+pub fn hint_for_text(text: &str) -> String {
+    if has_unit(text.trim()) {
+        format!("; {NO_UNITS}")
+    } else if text.trim().parse::<f64>().is_ok_and(f64::is_finite) {
+        "; a number stands without quotes".into()
+    } else {
+        String::new()
+    }
+}
+
+const NO_UNITS: &str = "numbers have no units, the name of the key tells the unit";
+
+/// A number, and behind it letters that begin a unit.
+fn has_unit(text: &str) -> bool {
+    let is_unit = |unit: &str| {
+        let unit = unit.trim_start();
+        unit.starts_with(|c: char| c.is_alphabetic() || matches!(c, '%' | '°' | 'µ'))
+            && unit.chars().all(|c| c.is_alphanumeric() || " %°µ/*^².-·".contains(c))
+    };
+    // The longest beginning that is a number: `5e` has none of the exponent.
+    let ends = text.char_indices().map(|(at, _)| at).skip(1).take(40);
+    let number = ends.filter(|&at| is_number(&text[..at])).last();
+    number.is_some_and(|end| is_unit(&text[end..]) && !is_of_another_base(text))
+}
+
+fn is_number(text: &str) -> bool {
+    text.ends_with(|c: char| c.is_ascii_digit() || c == '.') && text.replace('_', "").parse::<f64>().is_ok()
+}
+
+/// `0xff`, `0b1`
+fn is_of_another_base(text: &str) -> bool {
+    ["0x", "0o", "0b"].iter().any(|begin| text.starts_with(begin))
 }
 
 /// `.05`, `5.`
@@ -111,10 +157,37 @@ mod tests {
         assert!(at("x = /run/x", "/run", boolean).ends_with("as in \"/run/x\""));
         assert!(at("x = [1, two]", "two", boolean).contains("found two without quotes"));
         assert_eq!(at("movable = True", "True", boolean), "found True, allowed: true, in small letters");
-        assert!(at("movable = no # not yet", "no", boolean).contains("allowed: false"));
+        assert!(at("movable = no # not yet", "no", boolean).contains("found no, allowed: true or false"));
         assert_eq!(at("[motor]", "motor", boolean), boolean);
         for other in ["x = ", "x = = 1", "x = 1"] {
             assert_eq!(explain(other, 4, boolean), boolean, "{other}");
+        }
+    }
+
+    #[test]
+    fn a_number_with_its_unit_is_told_that_the_key_has_it() {
+        let string = "string values must be quoted, expected literal string";
+        for (text, found) in [
+            ("r = 5 mm\n", "5 mm"),
+            ("r = 5mm # thick", "5mm"),
+            ("r = -1.5e-3 m/s", "-1.5e-3 m/s"),
+            ("r = 5 %", "5 %"),
+            ("x = [0.1 m, 2]", "0.1 m"),
+            ("shape = { kind = 'sphere', r = 5 mm }", "5 mm"),
+        ] {
+            let said = at(text, found, string);
+            assert!(said.starts_with(&format!("found {found}, allowed: a number alone; ")), "{said}");
+            assert!(said.ends_with("the name of the key tells the unit"), "{said}");
+        }
+        for (text, part) in [("r = 1 2", "1 2"), ("r = 0xzz", "0xzz"), ("r = 5", "5"), ("[5 mm]", "5 mm")] {
+            assert!(!at(text, part, string).contains("unit"), "{text}");
+        }
+        for text in ["500 N/m", "5mm", " 1 kHz "] {
+            assert!(hint_for_text(text).ends_with("tells the unit"), "{text}");
+        }
+        assert_eq!(hint_for_text("500"), "; a number stands without quotes");
+        for text in ["", "two", "N 5", "nan", "2024-01-01", "1 2", "5 apples and a pear!"] {
+            assert_eq!(hint_for_text(text), "", "{text}");
         }
     }
 

@@ -271,9 +271,11 @@ static inline int phantom_is_granted(const PhantomRequest *request, const Phanto
                  "the driver's memory layout is 0x%016llx, this program's 0x%016llx; rebuild both from the same source",
                  (unsigned long long)answer->layout_hash, (unsigned long long)request->layout_hash);
     } else if (answer->verdict == PHANTOM_VERDICT_LEASE_HELD) {
+        char holder[40] = "a process of another PID namespace";
+        if (answer->holder_pid) snprintf(holder, sizeof holder, "process %llu", (unsigned long long)answer->holder_pid);
         snprintf(error, PHANTOM_ERROR_BYTES,
-                 "the devices are commanded by process %llu (%.*s) already; end it first, or attach as an observer",
-                 (unsigned long long)answer->holder_pid, PHANTOM_NAME_BYTES, (const char *)answer->holder_name);
+                 "the devices are commanded by %s (%.*s) already; end it first, or attach as an observer", holder,
+                 PHANTOM_NAME_BYTES, (const char *)answer->holder_name);
     } else if (answer->verdict == PHANTOM_VERDICT_NOT_ALLOWED && answer->allowed_group_plus_one) {
         snprintf(error, PHANTOM_ERROR_BYTES,
                  "the driver does not let user %u ask for this (kind %llu): members of group %llu may",
@@ -332,6 +334,16 @@ static inline void phantom_close(int fds[2]) {
         if (fds[i] >= 0) close(fds[i]);
 }
 
+/* A driver in a container tells numbers of processes that mean others here, or nobody; the kernel knows its own here. */
+static inline void phantom_number_as_here(int connection, PhantomAnswer *answer) {
+    struct ucred listener;
+    socklen_t length = sizeof listener;
+    if (getsockopt(connection, SOL_SOCKET, SO_PEERCRED, &listener, &length)) return;
+    if ((uint64_t)listener.pid == answer->driver_pid) return;
+    answer->driver_pid = (uint64_t)listener.pid;
+    answer->holder_pid = 0;
+}
+
 /* Sends a request and receives the answer, which must grant it. Returns the connection and fills in the descriptors
  * that came, which are the caller's then; -1: see `error`. */
 static inline int phantom_exchange(const char *path, const PhantomRequest *request, PhantomAnswer *answer, int fds[2],
@@ -344,8 +356,9 @@ static inline int phantom_exchange(const char *path, const PhantomRequest *reque
     if (phantom_receive(connection, answer, fds) < sizeof *answer) {
         snprintf(error, PHANTOM_ERROR_BYTES, "the driver at %.200s gives no answer; it may be stopped, or no driver",
                  path);
-    } else if (phantom_is_granted(request, answer, error)) {
-        return connection;
+    } else {
+        phantom_number_as_here(connection, answer);
+        if (phantom_is_granted(request, answer, error)) return connection;
     }
     phantom_close(fds);
     close(connection);

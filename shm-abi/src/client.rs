@@ -8,6 +8,7 @@ use crate::layout::{LAYOUT_HASH, MAGIC};
 use crate::peer::{Peer, ProcessWords};
 use crate::segment::{self, CommanderMemory, DriverView, SegmentError};
 use crate::socket;
+use crate::socket_file;
 use crate::stop_socket;
 use rustix::net::sockopt::{Timeout, set_socket_timeout};
 use rustix::net::{AddressFamily, SocketAddrUnix, SocketFlags, SocketType};
@@ -277,6 +278,7 @@ pub fn attach(socket: &Path, request: &Request) -> Result<Attachment, AttachErro
 }
 
 fn exchange(socket: &Path, request: &Request) -> Result<(Answer, Vec<OwnedFd>, OwnedFd), AttachError> {
+    let socket = socket_file::without_end(socket);
     let connection = connect(socket)?;
     // A driver that has no place for us answers unasked and hangs up: its answer counts for more than our
     // broken pipe.

@@ -24,7 +24,7 @@ use crate::peer::{Peer, Process, ProcessWords, refuse_descriptors};
 use crate::rights::{Right, Rights};
 use crate::segment::{CommanderView, DriverMemory, LeaseOffer};
 use crate::socket;
-use crate::socket_file::{Lock, SocketFile, make_sure_nobody_listens};
+use crate::socket_file::{Lock, SocketFile, make_sure_nobody_listens, without_end};
 use connection::{Connection, Heard, Stage, timespec};
 use rustix::event::{PollFd, PollFlags, poll};
 use rustix::io::Errno;
@@ -158,6 +158,7 @@ impl Server {
     /// # Errors
     /// As [`bind`](Self::bind).
     pub fn bind_for(path: &Path, rights: Rights) -> Result<Self, BindError> {
+        let path = without_end(path);
         if let Some(directory) = path.parent().filter(|directory| !directory.as_os_str().is_empty()) {
             std::fs::DirBuilder::new()
                 .recursive(true)

@@ -219,9 +219,14 @@ pub fn whole_path(path: &Path) -> PathBuf {
 
 /// A name beside another.
 pub(crate) fn suffixed(path: &Path, suffix: &str) -> PathBuf {
-    let mut name = path.as_os_str().to_os_string();
+    let mut name = without_end(path).as_os_str().to_os_string();
     name.push(suffix);
     PathBuf::from(name)
+}
+
+/// The path without slashes behind its last name, which shells add to what they take for a directory.
+pub(crate) fn without_end(path: &Path) -> &Path {
+    path.components().as_path()
 }
 
 #[cfg(test)]

@@ -240,6 +240,17 @@ fn a_c_program_is_told_what_a_driver_of_an_older_version_does_not_know_and_who_m
             Answer::new(Verdict::NotAllowed),
             format!("the driver does not let user {user} ask for this (kind 7): root and the user that it runs as may\n"),
         ),
+        (
+            Answer { driver_pid: std::process::id().into(), holder_pid: 42, ..Answer::new(Verdict::LeaseHeld) },
+            "the devices are commanded by process 42 () already; end it first, or attach as an observer\n".into(),
+        ),
+        // A driver whose number here is another one tells numbers that mean nothing here.
+        (
+            Answer { driver_pid: 1, holder_pid: 42, ..Answer::new(Verdict::LeaseHeld) },
+            "the devices are commanded by a process of another PID namespace () already; end it first, or attach as an \
+             observer\n"
+                .into(),
+        ),
     ];
     for (answer, expected) in cases {
         let directory = common::directory();

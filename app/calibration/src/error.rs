@@ -3,6 +3,7 @@
 use thiserror::Error;
 
 use crate::pairs::{MAX_EXTENT_M, MIN_EXTENT_M};
+use crate::unit::{Unit, ask_unit};
 
 /// Why a text holds no pairs.
 #[derive(Debug, Clone, PartialEq, Eq, Error)]
@@ -63,15 +64,28 @@ pub enum CalibrationError {
         /// The pair's line.
         line: usize,
     },
-    /// Probably millimetres.
-    #[error(
-        "the points of the {whose} reach over {found:.1}; allowed: at most {MAX_EXTENT_M} m. Are they millimetres? The columns are metres: divide them by 1000"
-    )]
+    /// Probably millimetres or centimetres.
+    #[error("the points of the {whose} reach over {found:.1}; allowed: at most {MAX_EXTENT_M} m. {}", ask_unit(*unit))]
     TooWide {
         /// Whose.
         whose: &'static str,
         /// Diagonal of their box or their largest coordinate, in the unit of the file.
         found: f64,
+        /// The unit that they probably have.
+        unit: Option<Unit>,
+    },
+    /// One half of the pairs is in another unit.
+    #[error(
+        "the points of the {whose} lie {ratio:.1} times as far apart as those of the other; allowed: the same, as far as \
+         lengths are measured. {}", ask_unit(*unit)
+    )]
+    OtherUnit {
+        /// Whose are larger.
+        whose: &'static str,
+        /// By how much.
+        ratio: f64,
+        /// The unit that they probably have.
+        unit: Option<Unit>,
     },
     /// A device that stood still.
     #[error(

@@ -46,6 +46,7 @@ mod residuals;
 mod rigid;
 mod spread;
 mod transform;
+mod unit;
 
 pub use accuracy::Accuracy;
 pub use error::{CalibrationError, PairsError};
@@ -56,3 +57,4 @@ pub use pairs::{MAX_EXTENT_M, MAX_PAIRS, MIN_EXTENT_M, Pair, parse_pairs};
 pub use residuals::Residuals;
 pub use spread::Spread;
 pub use transform::{Shape, Transform};
+pub use unit::Unit;

@@ -8,6 +8,7 @@
 use nalgebra::Vector3;
 
 use crate::error::{CalibrationError, PairsError};
+use crate::unit::Unit;
 
 /// One point, measured by both devices.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -114,14 +115,41 @@ pub(crate) fn check(pairs: &[Pair]) -> Result<(), CalibrationError> {
             return Err(CalibrationError::NotFinite { line: pair.line });
         }
     }
-    check_extent("fiducial", pairs, |pair| pair.fiducial)?;
-    check_extent("other device", pairs, |pair| pair.other)
+    let reaches = [reach_m(pairs, |pair| pair.fiducial), reach_m(pairs, |pair| pair.other)];
+    let ratio = reaches[0] / reaches[1];
+    check_extent(FIDUCIAL, pairs, |pair| pair.fiducial, ratio)?;
+    check_extent(OTHER, pairs, |pair| pair.other, 1.0 / ratio)?;
+    for (whose, ratio) in [(FIDUCIAL, ratio), (OTHER, 1.0 / ratio)] {
+        if ratio > MOST_RATIO {
+            return Err(CalibrationError::OtherUnit { whose, ratio, unit: Unit::of_ratio(ratio) });
+        }
+    }
+    Ok(())
+}
+
+const FIDUCIAL: &str = "fiducial";
+const OTHER: &str = "other device";
+/// Beyond that no two devices measure the same lengths, whatever their links: one of them counts in another unit. A
+/// layout takes half of it.
+const MOST_RATIO: f64 = 4.0;
+
+/// Median distance of points from their middle, which a few that do not belong leave as it is.
+fn reach_m(pairs: &[Pair], point: impl Fn(&Pair) -> Vector3<f64>) -> f64 {
+    let points: Vec<Vector3<f64>> = pairs.iter().map(point).collect();
+    let middle = Vector3::from_fn(|axis, _| median(points.iter().map(|point| point[axis]).collect()));
+    median(points.iter().map(|point| (point - middle).norm()).collect())
+}
+
+fn median(mut numbers: Vec<f64>) -> f64 {
+    let middle = numbers.len() / 2;
+    if numbers.is_empty() { 0.0 } else { *numbers.select_nth_unstable_by(middle, f64::total_cmp).1 }
 }
 
 fn check_extent(
     whose: &'static str,
     pairs: &[Pair],
     point: impl Fn(&Pair) -> Vector3<f64>,
+    ratio: f64,
 ) -> Result<(), CalibrationError> {
     let Some(first) = pairs.first().map(&point) else { return Ok(()) };
     let corners = |(low, high): (Vector3<f64>, Vector3<f64>), p: Vector3<f64>| (low.inf(&p), high.sup(&p));
@@ -129,7 +157,9 @@ fn check_extent(
     let extent_m = (high - low).norm();
     let furthest_m = low.amax().max(high.amax());
     if extent_m > MAX_EXTENT_M || furthest_m > MAX_EXTENT_M {
-        return Err(CalibrationError::TooWide { whose, found: extent_m.max(furthest_m) });
+        let found = extent_m.max(furthest_m);
+        let unit = Unit::of_ratio(ratio).or_else(|| Unit::of_extent(found));
+        return Err(CalibrationError::TooWide { whose, found, unit });
     }
     if extent_m < MIN_EXTENT_M {
         return Err(CalibrationError::HardlyMoved { whose, extent_m });

@@ -35,7 +35,7 @@ pub enum PlotError {
     #[error("cannot encode the picture: {0}")]
     Encoding(#[from] png::EncodingError),
     /// The file could not be written.
-    #[error("cannot write {file}: {source}")]
+    #[error("cannot write {file}: {}", rt_core::limits::with_remedy(.source))]
     Write {
         /// Which.
         file: PathBuf,

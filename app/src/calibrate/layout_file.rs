@@ -2,8 +2,8 @@
 
 use super::CalibrateArgs;
 use calibration::Fit;
-use rt_core::input_file;
 use rt_core::replacement::Replacement;
+use rt_core::{input_file, limits};
 use std::fs;
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
@@ -43,7 +43,10 @@ pub enum LayoutFileError {
         detail: String,
     },
     /// It cannot be written.
-    #[error("{}: cannot be written: {source}; name a file in a directory that can be written", file.display())]
+    #[error(
+        "{}: cannot be written: {}", file.display(),
+        limits::with_remedy_or(.source, "name a file in a directory that can be written")
+    )]
     Write {
         /// The file.
         file: PathBuf,

@@ -8,6 +8,7 @@
 
 use crate::progress::StatusLine;
 use calibration::{Coverage, Gathering, Pair};
+use io_driver::cli::say_line_if_late;
 use io_driver::say::say;
 use nalgebra::Vector3;
 use rt_core::signals::StopSignals;
@@ -80,6 +81,8 @@ const MOST_FORCE_N: f64 = 0.05;
 const NAP: Duration = Duration::from_millis(5);
 /// A driver tells a frame in each tick.
 const SILENCE: Duration = Duration::from_secs(5);
+/// Time of silence after which it is told: far more than a busy machine makes of a tick.
+const WARNING: Duration = Duration::from_millis(500);
 
 /// Gathers until there is enough, time is up, or a signal asks for the end.
 pub(super) fn gather(wish: &Wish, signals: &StopSignals) -> Gathered {
@@ -105,7 +108,10 @@ struct Session {
 
 impl Session {
     fn open(wish: &Wish) -> Result<Self, LiveError> {
-        let attachment = client::observe(&wish.socket, "phantom3 calibrate")?;
+        let late =
+            "phantom3 calibrate: the driver has not answered yet; it may be stopped (see `ps`), waiting";
+        let attachment =
+            say_line_if_late(late.into(), || client::observe(&wish.socket, "phantom3 calibrate"))?;
         let names: Vec<String> =
             attachment.driver.info().devices.iter().map(|device| device.name.clone()).collect();
         let devices = [wish.fiducial, wish.other];
@@ -132,6 +138,7 @@ impl Session {
     fn run(&mut self, seconds: f64, signals: &StopSignals) -> Result<(), LiveError> {
         let begun = Instant::now();
         let mut told = Instant::now();
+        let mut is_warned = false;
         let mut coverage = self.gathering.coverage();
         while begun.elapsed().as_secs_f64() < seconds
             && signals.requested().is_none()
@@ -139,15 +146,25 @@ impl Session {
         {
             if self.take_frames() {
                 told = Instant::now();
+                is_warned = false;
             } else if !self.attachment.connection.is_open() {
                 return Err(LiveError::DriverGone);
             } else if told.elapsed() > SILENCE {
                 return Err(LiveError::Silent(SILENCE.as_secs()));
+            } else if told.elapsed() > WARNING && !is_warned {
+                is_warned = true;
+                self.line.end();
+                say(format_args!(
+                    "phantom3 calibrate: the driver has told nothing for {} ms; it may be stopped (see `ps`), looking on",
+                    WARNING.as_millis()
+                ));
             }
             if self.gathering.pairs().len() > coverage.count {
                 coverage = self.gathering.coverage();
             }
-            self.line.show(|| advice(&coverage));
+            if !is_warned {
+                self.line.show(|| advice(&coverage));
+            }
             std::thread::sleep(NAP);
         }
         self.line.end();

@@ -5,8 +5,8 @@
 //! Output: what programs want (the layout, with `--json` the result) on standard output, what people want on standard
 //! error.
 //!
-//! Exit status: 0 done; 2 bad usage or bad input, and pairs that determine nothing; 3 the driver went away meanwhile, or pairs or the
-//! layout could not be written beside a result that is told.
+//! Exit status: 0 done; 2 bad usage or bad input, and pairs that determine nothing; 3 the driver went away meanwhile, or
+//! pairs, the layout or the figure could not be written.
 
 #![allow(non_snake_case)] // Frames are capital letters: X_WF takes F to W.
 
@@ -29,8 +29,11 @@ use layout_file::LayoutFileError;
 use live::LiveError;
 use plot::PlotError;
 use report::Report;
+use rt_core::file_kind;
 use rt_core::input_file;
+use rt_core::limits;
 use rt_core::replacement::{self, Replacement};
+use rt_core::separators;
 use rt_core::signals::StopSignals;
 use std::io;
 use std::path::{Path, PathBuf};
@@ -112,6 +115,11 @@ pub enum CalibrateFailure {
     /// The figure's name does not say what it is.
     #[error("--plot {}: found another ending; allowed: .svg or .png", .0.display())]
     PlotKind(PathBuf),
+    /// The standard output is no file.
+    #[error(
+        "--{0} -: found `-`, allowed: a file (./- is one); without --write the layout goes to the standard output"
+    )]
+    NoStream(&'static str),
     /// Two files under one name.
     #[error("--{a} and --{b} name the same file {}; name two", file.display())]
     SameFile {
@@ -193,8 +201,19 @@ pub enum CalibrateFailure {
         source: PlotError,
     },
     /// A result cannot be written.
-    #[error("{}: cannot be written: {source}", file.display())]
+    #[error("{}: cannot be written: {}", file.display(), limits::with_remedy(.source))]
     Output {
+        /// The file.
+        file: PathBuf,
+        /// Why.
+        source: io::Error,
+    },
+    /// The file for pairs cannot be written, which is found out before they are gathered.
+    #[error(
+        "--save-pairs {}: cannot be written: {}", file.display(),
+        limits::with_remedy_or(.source, "name a file in a directory that can be written")
+    )]
+    PairsUnwritable {
         /// The file.
         file: PathBuf,
         /// Why.
@@ -227,11 +246,19 @@ pub fn run(args: &CalibrateArgs) -> ExitCode {
         Ok(()) => ExitCode::SUCCESS,
         Err(failure) => {
             say(format_args!("phantom3 calibrate: {failure}"));
-            let is_fault = match &failure {
-                CalibrateFailure::Live(error) => error.is_fault(),
-                failure => matches!(failure, CalibrateFailure::AllElse),
-            };
-            ExitCode::from(if is_fault { 3 } else { 2 })
+            ExitCode::from(if failure.is_fault() { 3 } else { 2 })
+        }
+    }
+}
+
+impl CalibrateFailure {
+    /// Whether it went wrong after it had begun.
+    fn is_fault(&self) -> bool {
+        match self {
+            Self::Live(error) => error.is_fault(),
+            Self::Write(error) => matches!(error, LayoutFileError::Write { .. }),
+            Self::Plot { .. } | Self::Output { .. } | Self::OnlyWritten { .. } | Self::AllElse => true,
+            _ => false,
         }
     }
 }
@@ -301,6 +328,12 @@ impl Plan {
         }
         if let Some(file) = &args.plot {
             figure::kind_of(file).ok_or_else(|| CalibrateFailure::PlotKind(file.clone()))?;
+        }
+        let stream = [("write", &args.write), ("plot", &args.plot), ("save-pairs", &args.save_pairs)]
+            .into_iter()
+            .find(|(_, file)| file.as_deref() == Some(Path::new("-")));
+        if let Some((option, _)) = stream {
+            return Err(CalibrateFailure::NoStream(option));
         }
         let write = match &args.write {
             Some(file) if file.as_os_str().is_empty() => Some(default_layout::path()?),
@@ -404,7 +437,14 @@ const FEWEST_PAIRS: usize = 3;
 /// Pipes that somebody writes are welcome; what never begins or never ends is not.
 fn read_pairs(file: &Path) -> io::Result<String> {
     let bytes = input_file::read_all(input_file::open_stream(file)?, MAX_PAIRS_BYTES)?;
-    input_file::text(bytes)
+    if let Some(words) = file_kind::mistaken(&bytes) {
+        return Err(io::Error::new(io::ErrorKind::InvalidData, words));
+    }
+    let text = input_file::text(bytes)?;
+    match separators::mistaken_ends(&text) {
+        Some(words) => Err(io::Error::new(io::ErrorKind::InvalidData, words)),
+        None => Ok(text),
+    }
 }
 
 /// Room for as many pairs as there may be, with all their digits.
@@ -419,7 +459,7 @@ fn refuse_unwritable(file: &Path) -> Result<(), CalibrateFailure> {
         return Err(CalibrateFailure::NotPairs(file.into()));
     }
     let begun = Replacement::begin(file).map(drop);
-    begun.map_err(|source| CalibrateFailure::Output { file: file.into(), source })
+    begun.map_err(|source| CalibrateFailure::PairsUnwritable { file: file.into(), source })
 }
 
 /// Numbers as short as they can be read back exactly.

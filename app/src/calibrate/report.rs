@@ -26,6 +26,8 @@ pub(super) struct Report<'a> {
 const LISTED: usize = 20;
 /// Two arms of one type differ by about this share in their geometry; more is worth a word.
 const ODD_SCALE: f64 = 0.01;
+/// Points anywhere in a cube of 1.4 m (m).
+const WIDE_M: f64 = 0.4;
 
 impl fmt::Display for Report<'_> {
     fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
@@ -95,8 +97,23 @@ impl Report<'_> {
         }
     }
 
-    /// Of a fit to few pairs.
+    /// Of a fit to few pairs, and of points that are hardly those of a desktop device.
     fn warning(&self) -> Option<String> {
+        let warnings: Vec<String> = [self.few_pairs(), self.wide()].into_iter().flatten().collect();
+        (!warnings.is_empty()).then(|| warnings.join(". "))
+    }
+
+    fn wide(&self) -> Option<String> {
+        let extent_m = self.used.spread_other.rms_m[0];
+        (extent_m > WIDE_M).then(|| {
+            format!(
+                "the points reach over {extent_m:.2} m RMS, further than desktop devices do; the columns are metres: if \
+                 these are centimetres, divide them by 100"
+            )
+        })
+    }
+
+    fn few_pairs(&self) -> Option<String> {
         let (count, enough) = (self.used.count, self.found.model.enough_pairs());
         let noise = match self.used.accuracy {
             Some(accuracy) => {

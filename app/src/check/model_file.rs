@@ -130,8 +130,8 @@ impl Understood {
         };
         let text = model::write_obj(&self.mesh, &self.is_lid, names);
         replacement::write(out, text).map_err(|error| {
-            let remedy = limits::remedy(&error).unwrap_or_else(|| "name a file that can be written".into());
-            format!("cannot write {}: {error}; {remedy}", out.display())
+            let why = limits::with_remedy_or(&error, "name a file that can be written");
+            format!("cannot write {}: {why}", out.display())
         })
     }
 

@@ -15,6 +15,7 @@ use crate::recording::{Recording, RecordingError};
 use crate::row::{BodyRow, Row};
 use io_driver::say::say;
 use parquet::errors::ParquetError;
+use rt_core::limits;
 use rt_core::output_file::is_claimed;
 use rt_core::replacement::{Replacement, is_torn};
 use std::io;
@@ -201,7 +202,8 @@ fn not_created(out: &Path, error: &io::Error) -> RunFailure {
             "cannot create {place}: {error}; name another file, or wait until that has ended"
         ));
     }
-    wrong(&format_args!("cannot create {place}: {error}; name a file that can be written"))
+    let why = limits::with_remedy_or(error, "name a file that can be written");
+    wrong(&format_args!("cannot create {place}: {why}"))
 }
 
 fn not_kept(out: &Path, error: &io::Error) -> RunFailure {

@@ -47,7 +47,8 @@ pub struct PlotArgs {
     /// Pictures for the web alone, without PNG
     #[arg(long)]
     svg_only: bool,
-    /// Where: OUT.svg and OUT.png; with --by-entity a directory for ENTITY.svg and ENTITY.png
+    /// Where: OUT.svg and OUT.png, called as the recording in OUT/; with --by-entity a directory for ENTITY.svg and
+    /// ENTITY.png
     /// [default: the recording's name without its ending; with --objects and -objects behind it]
     #[arg(long, value_name = "OUT")]
     out: Option<PathBuf>,
@@ -131,9 +132,18 @@ impl PlotArgs {
             // Beside the picture of what the fingers felt, which is called as the recording.
             return if self.objects { with_end(&stem, "-objects") } else { stem };
         };
+        if !self.by_entity && is_directory_name(out) {
+            let name = self.recording.file_stem().unwrap_or_default();
+            return if self.objects { with_end(&out.join(name), "-objects") } else { out.join(name) };
+        }
         let is_picture = |ending: &OsStr| ending == "svg" || ending == "png";
         if out.extension().is_some_and(is_picture) { out.with_extension("") } else { out.clone() }
     }
+}
+
+/// `pictures/`, `.` and `..`
+fn is_directory_name(path: &Path) -> bool {
+    path.as_os_str().as_encoded_bytes().ends_with(b"/") || path.file_name().is_none()
 }
 
 /// With something behind its last letter, whatever points it holds.

@@ -3,21 +3,18 @@
 //! Model: columns have names, rows have cells. A recording whose end is missing is read as far as it is whole.
 
 use super::recorded::RecordedError;
-use crate::bounded_lines::BoundedLines;
-use crate::columns::{Cell, columns, each_cell};
+use crate::columns::{Cell, columns, each_cell, feature_named, friction_named};
 use crate::record::read::{
-    MOST_ROW_BYTES, RecordedRun, TimeOrder, check_begin, check_text, is_mcap, is_parquet,
+    CsvLines, ReadError, RecordedRun, TimeOrder, check_begin, check_cells, check_text, header_fault, is_mcap,
+    is_parquet,
 };
-use csv::{StringRecord, Terminator};
 use io_driver::say::say;
 use parquet::errors::ParquetError;
 use parquet::file::reader::{FileReader, SerializedFileReader};
 use parquet::record::Field;
 use parquet::record::reader::RowIter;
-use rt_core::input_file;
-use rt_core::plain_text::beginning;
-use std::fs::File;
-use std::io::{Read, Seek, SeekFrom};
+use rt_core::plain_text::{beginning, quoted};
+use rt_core::{input_file, separators};
 use std::path::{Path, PathBuf};
 
 /// A table that is read from its first row to its last.
@@ -52,15 +49,12 @@ impl Table {
     pub(super) fn open(file: &Path) -> Result<Self, RecordedError> {
         check_begin(file)?;
         let (columns, rows) = if is_mcap(file) {
-            let run = RecordedRun::open(file)?;
-            let columns = columns(run.names()).into_iter().map(|column| column.name).collect();
-            (columns, Rows::Run(Box::new(run)))
+            open_run(file)?
         } else if is_parquet(file) {
             let (columns, rows) = open_parquet(file).map_err(|source| unreadable(file, source))?;
             (columns, Rows::Parquet(Box::new(rows)))
         } else {
-            let (columns, rows) = CsvTable::open(file).map_err(|source| unreadable(file, source))?;
-            (columns, Rows::Csv(Box::new(rows)))
+            open_csv(file)?
         };
         for (index, column) in columns.iter().enumerate() {
             check_text(column)
@@ -77,7 +71,12 @@ impl Table {
     /// The next row; `None` behind the last.
     pub(super) fn next_row(&mut self) -> Result<Option<TableRow>, RecordedError> {
         let cells = match &mut self.rows {
-            Rows::Csv(csv) => csv.next_row().map_err(|source| unreadable(&self.file, source))?,
+            Rows::Csv(csv) => match csv.next_row() {
+                Ok(cells) => cells,
+                Err(CsvFault::Read(error)) => return Err(error.into()),
+                // The header is line 1.
+                Err(CsvFault::Row(why)) => return Err(bad_text(&self.file, self.read + 2, &why)),
+            },
             Rows::Run(run) => next_of_run(run)?,
             Rows::Parquet(rows) => next_of_parquet(rows).map_err(|source| unreadable(&self.file, source))?,
         };
@@ -87,14 +86,11 @@ impl Table {
                 let line = self.read + 1;
                 for (index, cell) in cells.iter().enumerate() {
                     let Value::Text(text) = cell else { continue };
-                    check_text(text).map_err(|why| {
-                        let name = self.columns.get(index).map_or("", String::as_str);
-                        bad_text(
-                            &self.file,
-                            line,
-                            &format!("column {} ({}): {why}", index + 1, beginning(name)),
-                        )
-                    })?;
+                    let name = self.columns.get(index).map_or("", String::as_str);
+                    check_text(text)
+                        .map_err(|why| format!("column {} ({}): {why}", index + 1, beginning(name)))
+                        .and_then(|()| check_word(name, text))
+                        .map_err(|why| bad_text(&self.file, line, &why))?;
                 }
                 Ok(Some(TableRow { line, cells }))
             }
@@ -107,7 +103,7 @@ impl Table {
 
     fn tell_cut(&self) {
         let cut = match &self.rows {
-            Rows::Csv(csv) => csv.is_cut.then_some("the last row is not complete and is left out"),
+            Rows::Csv(csv) => csv.lines.cut.as_deref(),
             Rows::Run(run) => run.cut(),
             Rows::Parquet(_) => None,
         };
@@ -155,6 +151,19 @@ impl TableRow {
     }
 }
 
+/// Refuses a word that a recording does not have in such a column.
+fn check_word(column: &str, word: &str) -> Result<(), String> {
+    let is_known = match column.rsplit_once('_') {
+        Some((_, "feature")) => feature_named(word).is_some(),
+        Some((_, "friction")) => friction_named(word).is_some(),
+        _ => true,
+    };
+    if is_known {
+        return Ok(());
+    }
+    Err(format!("{} is {}, which is no word for it", beginning(column), quoted(word)))
+}
+
 fn unreadable(file: &Path, source: impl Into<Box<dyn std::error::Error + Send + Sync>>) -> RecordedError {
     RecordedError::Read { file: file.into(), source: source.into() }
 }
@@ -163,59 +172,45 @@ fn bad_text(file: &Path, line: u64, why: &str) -> RecordedError {
     RecordedError::BadText { file: file.into(), line, why: why.into() }
 }
 
-/// Text, whose last line may be cut off.
+/// A table in text that is not in all columns that of a recording: those that are known are found by their names.
 struct CsvTable {
-    reader: csv::Reader<BoundedLines<File>>,
-    row: StringRecord,
-    /// Where the file ends, if that is in the middle of a line (bytes).
-    cut_at: Option<u64>,
-    is_cut: bool,
+    lines: CsvLines,
+    columns: usize,
 }
 
 impl CsvTable {
-    fn open(file: &Path) -> Result<(Vec<String>, Self), csv::Error> {
-        let mut opened = input_file::open(file)?;
-        let cut_at = end_of_cut_file(&mut opened)?;
-        // Lines end as for `export` and `replay`: the carriage returns that Windows puts before the ends do not count.
-        let mut builder = csv::ReaderBuilder::new();
-        builder.terminator(Terminator::Any(b'\n'));
-        let mut reader = builder.from_reader(BoundedLines::new(opened, MOST_ROW_BYTES));
-        let columns = reader.headers()?;
-        let last = columns.len().saturating_sub(1);
-        let columns =
-            columns.iter().enumerate().map(|(index, name)| without_end(name, index == last).into()).collect();
-        Ok((columns, Self { reader, row: StringRecord::new(), cut_at, is_cut: false }))
-    }
-
-    fn next_row(&mut self) -> Result<Option<Vec<Value>>, csv::Error> {
-        let is_row = self.reader.read_record(&mut self.row);
-        // Half a number is a number, and half a row is an error: neither counts.
-        if self.cut_at == Some(self.reader.position().byte()) && !matches!(is_row, Ok(false)) {
-            self.is_cut = true;
-            return Ok(None);
-        }
-        let last = self.row.len().saturating_sub(1);
-        let cell = |(index, cell)| Value::Text(without_end(cell, index == last).into());
-        Ok(is_row?.then(|| self.row.iter().enumerate().map(cell).collect()))
+    fn next_row(&mut self) -> Result<Option<Vec<Value>>, CsvFault> {
+        let Some(line) = self.lines.next_line().map_err(CsvFault::Read)? else { return Ok(None) };
+        let cells: Vec<Value> = line.split(',').map(|cell| Value::Text(cell.into())).collect();
+        check_cells(&line, cells.len(), self.columns).map_err(CsvFault::Row)?;
+        Ok(Some(cells))
     }
 }
 
-/// The cell, of a line that may end as those of Windows.
-fn without_end(cell: &str, is_last: bool) -> &str {
-    if is_last { cell.strip_suffix('\r').unwrap_or(cell) } else { cell }
+/// Why there is no row.
+enum CsvFault {
+    Read(ReadError),
+    Row(String),
 }
 
-/// `None`: it ends with a whole line, or is a pipe.
-fn end_of_cut_file(file: &mut File) -> std::io::Result<Option<u64>> {
-    let length = file.metadata().ok().filter(std::fs::Metadata::is_file).map_or(0, |found| found.len());
-    if length == 0 {
-        return Ok(None);
+/// Columns and rows of a table in text. That of a recording is read as by all who read one, so that none is called
+/// damaged by some of them alone.
+fn open_csv(file: &Path) -> Result<(Vec<String>, Rows), ReadError> {
+    let mut lines = CsvLines::open(file)?;
+    let header = lines.header()?;
+    let Some(why) = header_fault(&header) else { return open_run(file) };
+    if !separators::hint_for_header(&header).is_empty() {
+        return Err(ReadError::NoRecording { file: file.into(), why });
     }
-    let mut last = [0];
-    file.seek(SeekFrom::Start(length - 1))?;
-    file.read_exact(&mut last)?;
-    file.rewind()?;
-    Ok((last != *b"\n").then_some(length))
+    let columns: Vec<String> = header.split(',').map(str::to_owned).collect();
+    let table = CsvTable { lines, columns: columns.len() };
+    Ok((columns, Rows::Csv(Box::new(table))))
+}
+
+fn open_run(file: &Path) -> Result<(Vec<String>, Rows), ReadError> {
+    let run = RecordedRun::open(file)?;
+    let columns = columns(run.names()).into_iter().map(|column| column.name).collect();
+    Ok((columns, Rows::Run(Box::new(run))))
 }
 
 fn next_of_run(run: &mut RecordedRun) -> Result<Option<Vec<Value>>, RecordedError> {

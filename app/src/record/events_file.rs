@@ -32,7 +32,7 @@ impl EventsFile {
         let is_table = EventFormat::of(file.path())? == EventFormat::Csv;
         let header = if is_table { KEYS.join(",") } else { String::new() };
         let lines = WholeLines::begin(file, &header)
-            .map_err(|source| RecordingError::Create { file: path.clone(), source })?;
+            .map_err(|source| RecordingError::Create { file: path.clone(), source }.of_events())?;
         Ok(Self { lines, path, names, book, period_ns, is_table })
     }
 
@@ -75,7 +75,7 @@ impl EventsFile {
         self.lines.keep().map_err(|source| self.failed(source))?;
         let rows = self.lines.rows();
         if self.lines.is_removed() {
-            Err(RecordingError::Removed { file: self.path, rows })
+            Err(RecordingError::Removed { file: self.path, rows }.of_events())
         } else {
             Ok(rows)
         }
@@ -83,9 +83,10 @@ impl EventsFile {
 
     fn failed(&self, source: io::Error) -> RecordingError {
         if self.lines.has_content() {
-            return RecordingError::NotBegun { file: self.path.clone(), source };
+            return RecordingError::NotBegun { file: self.path.clone(), source }.of_events();
         }
         let until_s = run_time_s(self.lines.last_tick().cast_signed(), self.period_ns);
         RecordingError::Write { file: self.path.clone(), source, until_s, rows: self.lines.rows() }
+            .of_events()
     }
 }

@@ -3,6 +3,7 @@
 //! Model: what ends in the middle (a killed process, a full disk, a copy that broke off) is read as far as it is whole,
 //! and [`RecordedRun::cut`] says so. What is there but wrong is an error.
 
+mod csv_lines;
 mod csv_rows;
 mod mcap_chunk;
 mod mcap_record;
@@ -13,8 +14,9 @@ use super::about::About;
 use super::destination::RunFormat;
 use crate::columns::Names;
 use crate::row::{BodyRow, Row};
+pub(crate) use csv_lines::CsvLines;
 use csv_rows::CsvRows;
-pub(crate) use csv_rows::MOST_ROW_BYTES;
+pub(crate) use csv_rows::{check_cells, header_fault};
 use mcap_rows::McapRows;
 use rt_core::file_kind::{self, BEGIN_BYTES};
 use rt_core::input_file;
@@ -177,7 +179,7 @@ impl RecordedRun {
     /// Known behind the last row: how it ends, if that is in the middle.
     pub fn cut(&self) -> Option<&str> {
         match &self.rows {
-            Rows::Csv(rows) => rows.cut.as_deref(),
+            Rows::Csv(rows) => rows.cut(),
             Rows::Mcap(rows) => rows.cut.as_deref(),
         }
     }

@@ -327,7 +327,7 @@ impl Recorder {
         let (rows, failure) = match thread.join() {
             Ok(Ok(rows)) => (rows, None),
             Ok(Err(error)) => {
-                let rows = if let RecordingError::Write { rows, .. } = error { rows } else { 0 };
+                let rows = if let RecordingError::Write { rows, .. } = error.cause() { *rows } else { 0 };
                 (rows, Some(error.to_string()))
             }
             Err(_) => (0, Some(panicked(&path))),
@@ -428,13 +428,13 @@ impl RecorderThread {
     /// Goes on without a file that takes no more; says how many rows it has, or what is wrong, which it tells.
     fn abandon(&mut self, error: RecordingError) -> Result<u64, RecordingError> {
         self.file = None;
-        if let RecordingError::Write { rows, .. } = &error
+        if let RecordingError::Write { rows, .. } = error.cause()
             && error.is_of_a_reader_who_left()
         {
             self.shared.reader_has_gone.store(true, Ordering::Relaxed);
             return Ok(*rows);
         }
-        if let RecordingError::NotBegun { .. } = error {
+        if let RecordingError::NotBegun { .. } = error.cause() {
             self.shared.is_as_before.store(true, Ordering::Relaxed);
         }
         say(format_args!("phantom3: {error}"));

@@ -213,7 +213,7 @@ impl<'d> Value<'d> {
         let number: f64 = match self.value.get_ref() {
             DeValue::Float(float) => float.as_str().parse().unwrap_or(f64::NAN),
             DeValue::Integer(_) => self.integer().ok_or_else(|| self.out_of_range(WIDE_INTEGER))? as f64,
-            _ => return Err(self.wrong_type(bound)),
+            _ => return Err(self.no_number(bound)),
         };
         if !number.is_finite() {
             let (found, allowed) = (self.found(), bound.to_string());
@@ -280,7 +280,7 @@ impl<'d> Value<'d> {
         match self.value.get_ref() {
             DeValue::Array(items) if items.len() == 3 => self.numbers_in(bound),
             DeValue::Integer(_) | DeValue::Float(_) => Ok([self.number(bound)?; 3]),
-            _ => Err(self.wrong_type(format!("{bound}, or an array of 3 {}", bound.of_several()))),
+            _ => Err(self.no_number(format!("{bound}, or an array of 3 {}", bound.of_several()))),
         }
     }
 
@@ -312,7 +312,7 @@ impl<'d> Value<'d> {
     /// A whole number within `range`.
     pub(crate) fn whole(&self, range: RangeInclusive<u64>) -> Result<u64, SceneError> {
         let allowed = format!("a whole number from {} to {}", range.start(), range.end());
-        let DeValue::Integer(_) = self.value.get_ref() else { return Err(self.wrong_type(allowed)) };
+        let DeValue::Integer(_) = self.value.get_ref() else { return Err(self.no_number(allowed)) };
         let whole = self.integer().and_then(|integer| u64::try_from(integer).ok());
         whole.filter(|whole| range.contains(whole)).ok_or_else(|| self.out_of_range(allowed))
     }
@@ -405,6 +405,16 @@ impl<'d> Value<'d> {
 
     fn wrong_type(&self, allowed: impl fmt::Display) -> SceneError {
         SceneError::WrongType { at: self.at(), found: self.found(), allowed: allowed.to_string() }
+    }
+
+    /// The same where a number is expected: people write it with its unit, or between quotes.
+    fn no_number(&self, allowed: impl fmt::Display) -> SceneError {
+        match self.value.get_ref() {
+            DeValue::String(text) => {
+                self.wrong_type(format_args!("{allowed}{}", toml_slips::hint_for_text(text)))
+            }
+            _ => self.wrong_type(allowed),
+        }
     }
 
     fn item(&self, i: usize, value: &'d Spanned<DeValue<'d>>) -> Value<'d> {

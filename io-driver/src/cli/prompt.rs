@@ -24,7 +24,11 @@ impl fmt::Display for PromptWords {
 /// own, so that neither a request without an answer delays them nor a standard error that nobody reads the request;
 /// where the system gives no thread they come after it.
 pub(super) fn say_if_late<T>(words: &str, body: impl FnOnce() -> T) -> T {
-    let line = format!("io-driver: {words}");
+    say_line_if_late(format!("io-driver: {words}"), body)
+}
+
+/// The same with a line that names another program.
+pub fn say_line_if_late<T>(line: String, body: impl FnOnce() -> T) -> T {
     run_with_watch(body, move || say(format_args!("{line}")))
 }
 

@@ -61,6 +61,7 @@ fn look(devices: Vec<DeviceStatus>) -> Look {
         cpu: Some(3),
         tick: Some(123_456),
         silent_for_s: None,
+        other_time_namespace: false,
         state: "active",
         fault: None,
         lease: 2,

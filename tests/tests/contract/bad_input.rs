@@ -83,6 +83,14 @@ fn a_scene_that_is_wrong_is_refused_with_file_line_key_finding_and_remedy() {
             "[[finger]]\nradius_m = \"1\"\n".into(),
             &["scene.toml:2: finger[0].radius_m", "the string \"1\"", "a number, 0 or more"],
         ),
+        (
+            "[[finger]]\nradius_m = \"5 mm\"\n".into(),
+            &["finger[0].radius_m", "the string \"5 mm\"", "a number, 0 or more; numbers have no units"],
+        ),
+        (
+            "[[finger]]\nradius_m = 5 mm\n".into(),
+            &["scene.toml:2:12: not valid TOML: found 5 mm, allowed: a number alone; numbers have no units"],
+        ),
         ("[[finger]]\nradius_m = nan\n".into(), &["finger[0].radius_m", "found nan", "a number, 0 or more"]),
         (
             "[[finger]]\nradius_m = -inf\n".into(),
@@ -572,6 +580,43 @@ fn a_recording_whose_lengths_are_lies_is_told_as_damaged_and_takes_no_memory_for
                 said.err
             );
         }
+    }
+}
+
+/// Scripts that expand too much fill no terminal.
+#[test]
+fn arguments_that_would_fill_screens_are_cut_short() {
+    let place = workplace();
+    let long = "x".repeat(100_000);
+    let option = format!("--seconds={long}");
+    for arguments in [
+        &["run", &long][..],
+        &["check", &long],
+        &["plot", &long],
+        &["convert", &long],
+        &["run", "scene.toml", "--rate-hz", &long],
+        &["run", "scene.toml", &option],
+        &["run", "scene.toml", "--attach", &long],
+        &["settings", "--set", &long],
+        &[&long],
+    ] {
+        let said = place.run(arguments);
+        assert_eq!(said.status, Some(2), "{}", said.err);
+        let told = said.out.len() + said.err.len();
+        assert!((20..1000).contains(&told), "{}: {told} bytes", arguments[0]);
+    }
+    let said = refused(&place, &["settings", "--set", "window.fullscreen=yes"]);
+    assert_says(&said, &["found yes, allowed: true or false"]);
+    let said = refused(&place, &["plot", "out.csv", "--from", "0,5"]);
+    assert_says(&said, &["tip: a decimal number has a point, as in 0.1"]);
+}
+
+#[test]
+fn a_thesis_file_without_a_word_is_refused() {
+    let place = workplace();
+    for text in ["", "// nothing\n\n"] {
+        place.write("list.ini", text);
+        assert_says(&refused(&place, &["convert", "list.ini"]), &["list.ini: found nothing but comments"]);
     }
 }
 

@@ -3,11 +3,14 @@
 use patience::prelude::*;
 use rustix::process::{Pid, Signal, kill_process};
 use shm_abi::{FaultReason, stop_socket};
+use std::ffi::OsStr;
+use std::path::Path;
 use std::process::Command;
 use std::time::{Duration, Instant};
 use system_tests::driver::{Driver, HANG, resting};
 use system_tests::faults::process::{self, End, Running};
 use system_tests::programs::io_driver;
+use system_tests::workplace::Workplace;
 
 #[test]
 fn strict_refuses_to_start_without_a_guarantee_and_leaves_nothing_behind() {
@@ -157,6 +160,103 @@ fn a_fault_is_not_left_because_somebody_asked_long_ago() {
     assert_eq!(frame.fault, FaultReason::EmergencyStop as u64, "{frame:?}");
     let clear = asked(&driver, "clear-fault");
     assert_eq!(clear.status, Some(0), "{clear:?}");
+}
+
+#[test]
+fn a_run_at_a_driver_in_its_fault_state_names_the_fault_and_the_command_that_leaves_it() {
+    let driver = Driver::start(&resting("real", 1));
+    let stop = asked(&driver, "emergency-stop");
+    assert_eq!(stop.status, Some(0), "{stop:?}");
+    let place = Workplace::new();
+    place.write("scene.toml", "[[finger]]\n");
+    let run = ["run", "scene.toml", "--seconds", "1", "--attach"].map(OsStr::new);
+    let said = place.run(run.into_iter().chain([driver.socket().as_os_str()]));
+    assert_eq!(said.status, Some(3), "{said:?}");
+    let command = format!("`io-driver clear-fault --socket {}`", driver.socket().display());
+    for words in ["an emergency stop was pressed; the motors are off; find the cause, then", &command] {
+        assert!(said.err.contains(words), "{words}: {}", said.err);
+    }
+}
+
+/// Clocks of time namespaces differ by as much as somebody says.
+#[test]
+fn a_driver_in_another_time_namespace_is_told_as_such_and_has_no_ages() {
+    let driver = Driver::start(&resting("real", 1));
+    let place = Workplace::new();
+    place.write("scene.toml", "[[finger]]\n");
+    for shift in ["100000", "-1000"] {
+        let apart = |program: &Command| {
+            let mut apart = Command::new("unshare");
+            apart.args(["--time", "--monotonic", shift]).arg(program.get_program());
+            apart
+        };
+        if !apart(&Command::new("true")).bounded_status().is_ok_and(|status| status.success()) {
+            println!("skipped: no time namespace can be had here");
+            return;
+        }
+        let mut status = apart(&io_driver());
+        status.args(["status", "--json", "--socket"]).arg(driver.socket());
+        let end = Running::start(&mut status).end();
+        assert_eq!(end.status, Some(0), "{end:?}");
+        let told: serde_json::Value = serde_json::from_str(&end.out).expect("JSON");
+        assert!(told["silent_for_s"].is_null() && told["other_time_namespace"] == true, "{}", end.out);
+        let mut status = apart(&io_driver());
+        status.args(["status", "--socket"]).arg(driver.socket());
+        let end = Running::start(&mut status).end();
+        assert!(end.out.contains("the driver lives in another time namespace"), "{end:?}");
+        let mut run = place.prepare(apart(&place.phantom3()));
+        run.args(["run", "scene.toml", "--seconds", "1", "--attach"]).arg(driver.socket());
+        let end = Running::start(&mut run).end();
+        assert_eq!((end.status, end.out.as_str()), (Some(2), ""), "{end:?}");
+        assert!(end.err.contains("lives in another time namespace, and its clock differs"), "{end:?}");
+    }
+    let told = asked(&driver, "status");
+    assert!(!told.out.contains("time namespace"), "{told:?}");
+}
+
+/// Shells and scripts put a slash behind what they take for a directory; who stops a driver has no time for that.
+#[test]
+fn a_slash_behind_the_name_of_a_socket_does_not_count() {
+    let mut driver = Driver::start(&resting("real", 1));
+    let slash = Path::new(driver.socket()).join("");
+    let status = process::io_driver(&["status"], &slash);
+    assert_eq!((status.status, status.err.as_str()), (Some(0), ""), "{status:?}");
+    let stop = process::io_driver(&["emergency-stop"], &slash);
+    assert_eq!((stop.status, stop.err.as_str()), (Some(0), ""), "{stop:?}");
+    let stop = process::io_driver(&["stop"], &slash);
+    assert_eq!(stop.status, Some(0), "{stop:?}");
+    assert_eq!(driver.wait().code(), Some(0));
+}
+
+/// A mistyped name would make directories that nobody asked for.
+#[test]
+fn a_directory_that_a_driver_makes_for_its_socket_is_told() {
+    let directory = tempfile::tempdir().expect("a directory");
+    let config = directory.path().join("driver.toml");
+    std::fs::write(&config, resting("real", 1)).expect("written");
+    let start = |socket: &Path, words: &str| {
+        let mut command = io_driver();
+        command.args(["run", "--config"]).arg(&config).arg("--socket").arg(socket);
+        let mut driver = Running::start(&mut command);
+        driver.hear("listening at");
+        driver.signal(Signal::TERM);
+        let end = driver.end();
+        assert_eq!(end.status, Some(0), "{end:?}");
+        assert_eq!(end.err.contains("made the directory"), !words.is_empty(), "{end:?}");
+        assert!(end.err.contains(words), "{end:?}");
+    };
+    let made = directory.path().join("a/b");
+    let words = format!("made the directory {} for the socket", made.display());
+    start(&made.join("driver.sock"), &words);
+    start(&made.join("driver.sock"), "");
+}
+
+#[test]
+fn a_decimal_comma_of_an_option_is_told_with_a_point() {
+    let mut zero = io_driver();
+    let end = Running::start(zero.args(["zero", "--wait", "0,5"])).end();
+    assert_eq!((end.status, end.out.as_str()), (Some(2), ""), "{end:?}");
+    assert!(end.err.contains("tip: a decimal number has a point, as in 0.1"), "{end:?}");
 }
 
 /// As the installed service has it: with a network, and so a table of sockets, of its own.

@@ -249,6 +249,10 @@ fn bad_input_ends_with_status_2_and_says_what_to_do() {
     place.write("utf16.csv", b"\xff\xfe1\0,\0");
     place.write("few.csv", pairs_csv(2, &Matrix3::identity()));
     place.write("mm.csv", pairs_csv(100, &(Matrix3::identity() * 1000.0)));
+    place.write("cm.csv", pairs_csv(100, &(Matrix3::identity() * 100.0)));
+    place.write("near.csv", pairs_csv(100, &(Matrix3::identity() * 0.05)));
+    place.write("packed.csv", b"\x1f\x8b\x08\0");
+    place.write("mac.csv", pairs_csv(100, &Matrix3::identity()).replace('\n', "\r"));
     place.write(
         "line.csv",
         (0..50).map(|i| format!("{i} 0 0 0 {i} 0\n").replace(' ', "e-2 ")).collect::<String>(),
@@ -258,7 +262,7 @@ fn bad_input_ends_with_status_2_and_says_what_to_do() {
     place.write("bad.toml", "[[device]]\nwobble = 1\n");
     place.write("a.toml", "[[device]]\n");
     place.write("b.toml", "[[device]]\n");
-    let cases: [(&[&str], &[&str]); 20] = [
+    let cases: [(&[&str], &[&str]); 26] = [
         (
             &["--pairs", "utf16.csv"],
             &["utf16.csv: cannot be read: it is UTF-16 text; save the file as UTF-8"],
@@ -272,6 +276,18 @@ fn bad_input_ends_with_status_2_and_says_what_to_do() {
             &["--pairs", "mm.csv"],
             &["mm.csv: the points of the other device", "millimetres", "divide them by 1000"],
         ),
+        (
+            &["--pairs", "cm.csv"],
+            &["cm.csv: the points of the other device", "centimetres", "divide them by 100\n"],
+        ),
+        (
+            &["--pairs", "near.csv"],
+            &["near.csv: the points of the fiducial lie 20.", "divide centimetres by 100"],
+        ),
+        (&["--pairs", "packed.csv"], &["packed.csv: cannot be read: it is compressed by gzip", "gunzip"]),
+        (&["--pairs", "mac.csv"], &["mac.csv: cannot be read: its lines end in carriage returns alone"]),
+        (&["--pairs", "pairs.csv", "--write", "-"], &["--write -: found `-`, allowed: a file"]),
+        (&["--pairs", "pairs.csv", "--plot", "-"], &["-: found another ending"]),
         (
             &["--pairs", "spoilt.csv"],
             &["spoilt.csv: ", "found: 1, the first on line 101", "--reject-outliers"],
@@ -426,13 +442,33 @@ fn a_live_calibration_makes_two_devices_meet_in_one_world() {
     assert!(gap(&record(&place, &driver, &["--layout", "in.toml"])) > 0.1);
 }
 
+/// Both halves in one unit agree, so that only their size can tell.
+#[test]
+fn points_further_apart_than_those_of_desktop_devices_are_fitted_with_a_warning() {
+    let place = Workplace::new();
+    let text = pairs_csv(300, &Matrix3::identity());
+    let scaled = |line: &str| {
+        let numbers = line.split(',').map(|cell| cell.parse::<f64>().expect("a number") * 10.0);
+        numbers.map(|number| number.to_string()).collect::<Vec<_>>().join(",") + "\n"
+    };
+    place.write("near.csv", &text);
+    place.write("far.csv", text.lines().map(scaled).collect::<String>());
+    for (file, warns) in [("near.csv", false), ("far.csv", true)] {
+        let said = place.run(["calibrate", "--pairs", file, "--json"]);
+        done(&said);
+        let words = "if these are centimetres, divide them by 100";
+        assert_eq!(said.err.contains(words), warns, "{}", said.err);
+        assert_eq!(said.out.contains(words), warns, "{}", said.out);
+    }
+}
+
 #[test]
 fn a_layout_that_cannot_be_written_is_not_lost() {
     let place = Workplace::new();
     place.write("pairs.csv", pairs_csv(300, &Matrix3::identity()));
     // Below a file there is no directory.
     let said = place.run(["calibrate", "--pairs", "pairs.csv", "--write", "pairs.csv/layout.toml"]);
-    assert_eq!(said.status, Some(2), "{said:?}");
+    assert_eq!(said.status, Some(3), "{said:?}");
     assert!(said.err.contains("pairs.csv/layout.toml: cannot be written"), "{}", said.err);
     assert_stands(&parse(&said.out), 1, &(truth()[0].inverse() * truth()[1]));
 }
@@ -451,8 +487,9 @@ fn a_layout_that_did_not_fit_onto_the_disk_is_no_success() {
         .expect("it runs")
         .bounded_output();
     let err = String::from_utf8_lossy(&said.stderr);
-    assert_eq!(said.status.code(), Some(2), "{err}");
+    assert_eq!(said.status.code(), Some(3), "{err}");
     assert!(err.contains("standard output: cannot be written: No space left"), "{err}");
+    assert!(err.contains("make room on that disk"), "{err}");
 }
 
 #[test]
@@ -575,4 +612,32 @@ fn a_driver_that_ends_meanwhile_is_a_fault_and_the_pairs_are_kept() {
     assert_eq!(said.status, Some(3), "{said:?}");
     assert!(said.err.contains("the driver has ended"), "{}", said.err);
     assert!(place.path("pairs.csv").exists());
+}
+
+/// Whoever holds two arms together wants to know within a second or so that nothing is gathered.
+#[test]
+fn a_driver_that_stands_still_is_told_soon_and_ends_as_before() {
+    let place = Workplace::new();
+    let driver = driver(&place);
+    let pid = Pid::from_child(&driver.child);
+    // While it is gathered, and while it is asked.
+    let gathering = Running::start(live(&place, &driver, &["--seconds", "3000"]));
+    gathers(&gathering);
+    kill_process(pid, Signal::STOP).expect("our own child");
+    let soon = |gathering: &Running, words: &str| {
+        let begun = Instant::now();
+        patience::until("it is told", || gathering.said_so_far().contains(words));
+        // It is looked on for 5 s, and asked for 2 s.
+        assert!(begun.elapsed() < Duration::from_millis(1900), "{:?}", begun.elapsed());
+    };
+    soon(&gathering, "the driver has told nothing for 500 ms; it may be stopped (see `ps`), looking on");
+    let said = gathering.wait();
+    assert_eq!(said.status, Some(3), "{said:?}");
+    assert!(said.err.contains("the driver has told nothing for 5 s"), "{}", said.err);
+    let asking = Running::start(live(&place, &driver, &["--seconds", "3000"]));
+    soon(&asking, "the driver has not answered yet; it may be stopped");
+    let said = asking.wait();
+    assert_eq!(said.status, Some(2), "{said:?}");
+    assert!(said.err.contains("does not answer within 2 s"), "{}", said.err);
+    kill_process(pid, Signal::CONT).expect("our own child");
 }

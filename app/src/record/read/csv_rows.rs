@@ -4,6 +4,7 @@
 //! is the shortest time between two of the first rows. A last line without its end is left out: half a number is a number.
 //! Windows line ends and a byte order mark, which editors and spreadsheets add, do not count.
 
+use super::csv_lines::CsvLines;
 use super::tick_order::{TickOrder, check_period};
 use super::{ReadError, check_text};
 use crate::columns::{Column, Names, columns, feature_named, friction_named};
@@ -12,19 +13,15 @@ use io_driver::device::{Extras, run_time_s};
 use nalgebra::{Quaternion, Vector3};
 use physics::GraspQuality;
 use rt_core::plain_text::{beginning, quoted};
-use rt_core::{input_file, separators};
+use rt_core::separators;
 use shm_abi::MAX_DEVICES;
 use std::collections::{HashMap, VecDeque};
-use std::fs::File;
-use std::io::{BufRead, BufReader, Read};
 use std::path::{Path, PathBuf};
 
 /// So many rows are looked at for the length of a tick.
 const LOOK_AHEAD: usize = 1000;
 /// Or so many bytes of them.
 const LOOK_AHEAD_BYTES: usize = 16 << 20;
-/// The longest row, of as many objects as a scene can have.
-pub(crate) const MOST_ROW_BYTES: usize = 64 << 20;
 /// As many entities as a scene can have.
 const MOST_NAMES: usize = 100_000;
 /// And more environments with doors than anybody made.
@@ -34,7 +31,7 @@ const USUAL_PERIOD_NS: u64 = 1_000_000;
 
 pub(super) struct CsvRows {
     file: PathBuf,
-    reader: BufReader<File>,
+    lines: CsvLines,
     ahead: VecDeque<String>,
     columns: Vec<Column>,
     line: u64,
@@ -43,15 +40,15 @@ pub(super) struct CsvRows {
     order: TickOrder,
     pub(super) names: Names,
     pub(super) period_ns: u64,
-    pub(super) cut: Option<String>,
 }
 
 impl CsvRows {
     pub(super) fn open(file: &Path) -> Result<Self, ReadError> {
-        let opened = input_file::open(file).map_err(|source| ReadError::Io { file: file.into(), source })?;
+        let mut lines = CsvLines::open(file)?;
+        let header = lines.header()?;
         let mut rows = Self {
             file: file.into(),
-            reader: BufReader::new(opened),
+            lines,
             ahead: VecDeque::new(),
             columns: Vec::new(),
             line: 0,
@@ -59,18 +56,15 @@ impl CsvRows {
             order: TickOrder::default(),
             names: Names::default(),
             period_ns: USUAL_PERIOD_NS,
-            cut: None,
         };
         let no_recording = |why: String| ReadError::NoRecording { file: file.into(), why };
-        let header = rows.read_line()?.ok_or_else(|| no_recording("it has no first line".into()))?;
-        let header = header.strip_prefix('\u{feff}').unwrap_or(&header);
-        rows.names = names_in(header);
+        rows.names = names_in(&header);
         rows.columns = columns(&rows.names);
-        check_header(header, &rows.names, &rows.columns).map_err(no_recording)?;
+        check_header(&header, &rows.names, &rows.columns).map_err(no_recording)?;
         let mut bytes = 0;
         while rows.ahead.len() < LOOK_AHEAD
             && bytes < LOOK_AHEAD_BYTES
-            && let Some(line) = rows.read_line()?
+            && let Some(line) = rows.lines.next_line()?
         {
             bytes += line.len();
             rows.ahead.push_back(line);
@@ -84,7 +78,7 @@ impl CsvRows {
     pub(super) fn next_row(&mut self) -> Result<Option<(Row, Vec<BodyRow>)>, ReadError> {
         let line = match self.ahead.pop_front() {
             Some(line) => line,
-            None => match self.read_line()? {
+            None => match self.lines.next_line()? {
                 Some(line) => line,
                 None => return Ok(None),
             },
@@ -99,32 +93,14 @@ impl CsvRows {
         ReadError::BadRow { file: self.file.clone(), line, why }
     }
 
-    /// A whole line without its end.
-    fn read_line(&mut self) -> Result<Option<String>, ReadError> {
-        let mut bytes = Vec::new();
-        let read = self.reader.by_ref().take(MOST_ROW_BYTES as u64).read_until(b'\n', &mut bytes);
-        read.map_err(|source| ReadError::Io { file: self.file.clone(), source })?;
-        if bytes.len() == MOST_ROW_BYTES {
-            let why = format!("a line has more than {MOST_ROW_BYTES} bytes");
-            return Err(ReadError::NoRecording { file: self.file.clone(), why });
-        }
-        if bytes.pop() != Some(b'\n') {
-            if !bytes.is_empty() {
-                self.cut = Some("the last row is not complete and is left out".into());
-            }
-            return Ok(None);
-        }
-        bytes.pop_if(|last| *last == b'\r');
-        let no_text = |_| ReadError::NoRecording { file: self.file.clone(), why: "it is no text".into() };
-        String::from_utf8(bytes).map(Some).map_err(no_text)
+    /// How the table ends, if that is in the middle of a row.
+    pub(super) fn cut(&self) -> Option<&str> {
+        self.lines.cut.as_deref()
     }
 
     fn parse(&mut self, line: &str) -> Result<(Row, Vec<BodyRow>), String> {
         let cells: Vec<&str> = line.split(',').collect();
-        if cells.len() != self.columns.len() {
-            let hint = separators::hint_for_row(line, self.columns.len());
-            return Err(format!("found {} cells, expected {}{hint}", cells.len(), self.columns.len()));
-        }
+        check_cells(line, cells.len(), self.columns.len())?;
         let mut cells = Cells {
             cells: &cells,
             columns: &self.columns,
@@ -301,6 +277,22 @@ fn no_number(cell: &str, column: &Column, allowed: &str) -> String {
 
 fn check_count(known: usize, most: usize, what: &str) -> Result<(), String> {
     if known < most { Ok(()) } else { Err(format!("more than {most} {what} are named; allowed: as many")) }
+}
+
+/// Refuses a row with more or fewer cells than there are columns.
+pub(crate) fn check_cells(line: &str, found: usize, expected: usize) -> Result<(), String> {
+    if found == expected {
+        return Ok(());
+    }
+    let hint = separators::hint_for_row(line, expected);
+    Err(format!("found {found} cells, expected {expected}{hint}"))
+}
+
+/// Why a first line is not that of a recording, if it is none.
+pub(crate) fn header_fault(header: &str) -> Option<String> {
+    let names = names_in(header);
+    let columns = columns(&names);
+    check_header(header, &names, &columns).err()
 }
 
 /// Says which column of a first line is the first that is not that of a recording.

@@ -10,7 +10,13 @@ use crate::{layout_refused, refused, with_entity, with_finger, with_shape, with_
 fn a_value_of_the_wrong_type_is_named_with_what_was_found() {
     refused(
         &with_shape("{ kind = \"sphere\", radius_m = \"0.05\" }"),
-        "s.toml:4: entity[0].shape.radius_m: found the string \"0.05\"; allowed: a number above 0",
+        "s.toml:4: entity[0].shape.radius_m: found the string \"0.05\"; allowed: a number above 0; a number stands \
+         without quotes",
+    );
+    refused(
+        &with_shape("{ kind = \"sphere\", radius_m = \"5 cm\" }"),
+        "s.toml:4: entity[0].shape.radius_m: found the string \"5 cm\"; allowed: a number above 0; numbers have no units, \
+         the name of the key tells the unit",
     );
     refused(
         &with_shape("{ kind = \"sphere\", radius_m = true }"),
@@ -418,7 +424,8 @@ fn a_size_that_no_shape_has_is_refused() {
         ),
         (
             "{ kind = \"sphere\", radius_m = 1, scale = \"2\" }",
-            "scale: found the string \"2\"; allowed: a number above 0, or an array of 3 numbers above 0",
+            "scale: found the string \"2\"; allowed: a number above 0, or an array of 3 numbers above 0; a number \
+             stands without quotes",
         ),
         ("{ kind = \"csg\", op = \"union\" }", CHILDREN),
         (

@@ -153,6 +153,44 @@ fn a_recording_that_is_damaged_is_exported_and_drawn_up_to_there_and_both_end_wi
     assert!(place.path("bad.svg").exists() && said.out.contains("written"), "{}", said.out);
 }
 
+/// One reader: what one command calls damaged, the other does.
+#[test]
+fn a_table_that_export_calls_damaged_is_called_so_by_plot_in_the_same_words() {
+    let (place, good) = with_table();
+    let lines: Vec<&str> = good.lines().collect();
+    let row = lines[50];
+    let with_row = |new: String| [&lines[..50], &[&*new], &lines[51..]].concat().join("\n") + "\n";
+    let (time, cells) = row.split_once(',').expect("columns");
+    let state = ["stick", "slip", "free"].into_iter().find(|state| row.contains(&format!(",{state},")));
+    let state = state.expect("a state");
+    for (text, words) in [
+        (with_row(String::new()), "bad.csv:51: found 1 cells, expected"),
+        (
+            with_row(row.replacen(state, "sliding", 1)),
+            "bad.csv:51: f0_friction is \"sliding\", which is no word",
+        ),
+        (with_row(format!("\"{time}\",{cells}")), "bad.csv:51: t is \"\\\""),
+        (with_row(format!("\t{row}")), "bad.csv:51: t is \"\\t"),
+        (with_row(format!("{row},1")), "bad.csv:51: found"),
+    ] {
+        place.write("bad.csv", &text);
+        let [exported, drawn] = [&["export", "bad.csv", "part.csv"][..], &["plot", "bad.csv", "--svg-only"]]
+            .map(|command| place.run(command));
+        assert_eq!((exported.status, drawn.status), (Some(3), Some(3)), "{}{}", exported.err, drawn.err);
+        assert_says(&drawn.err, &[words]);
+        assert_eq!(drawn.err, exported.err);
+    }
+    let header = lines[0].replace(',', "\t");
+    for text in [header + "\n", "\u{0}\u{1}\n".into(), String::from_utf8_lossy(b"BZh91AY").into_owned()] {
+        place.write("bad.csv", &text);
+        let [exported, drawn] = [&["export", "bad.csv", "new.csv"][..], &["plot", "bad.csv", "--svg-only"]]
+            .map(|command| refused(&place, command));
+        assert!(drawn == exported || text.starts_with('\0'), "{drawn}{exported}");
+    }
+    place.write("bad.csv", [0x80, 0xff, b'\n']);
+    assert_says(&refused(&place, &["plot", "bad.csv"]), &["bad.csv is no recording", "it is no text"]);
+}
+
 #[test]
 fn of_a_recording_without_rows_nothing_is_drawn_and_no_table_is_made() {
     let (place, good) = with_table();

@@ -2,7 +2,8 @@
 
 use super::{BALL, PRECIOUS, SCENE, assert_says, refused, with_recordings, workplace};
 use std::fs;
-use system_tests::faults::scarcity::mounted_twice;
+use std::process::Command;
+use system_tests::faults::scarcity::{mounted_twice, on_small_disk};
 use system_tests::workplace::{Running, Workplace};
 
 /// Of two devices, a tenth of a metre apart.
@@ -246,16 +247,91 @@ fn a_model_that_is_sound_can_be_felt_also_where_it_cannot_be_written() {
 
 /// As old Macintoshes wrote them: all commands that read tables say the same.
 #[test]
-fn a_table_whose_lines_end_in_carriage_returns_alone_is_refused_by_plot_as_by_the_others() {
+fn a_table_whose_lines_end_in_carriage_returns_alone_is_refused_by_all_in_the_same_words() {
     let place = workplace();
     with_recordings(&place);
     let text = fs::read_to_string(place.path("good.csv")).expect("a table");
     place.write("mac.csv", text.replace('\n', "\r"));
     place.write("windows.csv", text.replace('\n', "\r\n"));
-    refused(&place, &["export", "mac.csv", "new.csv"]);
-    refused(&place, &["plot", "mac.csv", "--out", "new"]);
+    place.write("mac-hand.csv", "t,f0_x,f0_y,f0_z\r0,0,0,0\r1,0,0,0\r");
+    for command in [
+        &["export", "mac.csv", "new.csv"][..],
+        &["replay", "mac.csv", "--scene", "scene.toml"],
+        &["plot", "mac.csv", "--out", "new"],
+        &["run", "scene.toml", "--hand", "mac-hand.csv"],
+    ] {
+        assert_says(&refused(&place, command), &["its lines end in carriage returns alone", "save it"]);
+    }
     let said = place.run(["plot", "windows.csv", "--svg-only"]);
     assert_eq!((said.status, said.err.as_str()), (Some(0), ""));
+}
+
+/// A result that cannot be written is a fault, of whichever command; full is the disk, not the name wrong.
+#[test]
+fn a_full_disk_ends_every_command_with_one_status_and_the_same_remedy() {
+    let place = workplace();
+    with_recordings(&place);
+    place.write("pairs.csv", PAIRS);
+    place.write("ball.ini", BALL);
+    fs::create_dir(place.path("disk")).expect("a directory");
+    let filled = "head -c 100000 /dev/zero > disk/all 2> /dev/null; exec \"$0\" \"$@\"";
+    for (arguments, file) in [
+        (&["convert", "ball.ini", "--out", "disk/out.toml"][..], "disk/out.toml"),
+        (&["calibrate", "--pairs", "pairs.csv", "--write", "disk/layout.toml"], "disk/layout.toml"),
+        (&["calibrate", "--pairs", "pairs.csv", "--plot", "disk/residuals.svg"], "disk/residuals.svg"),
+        (&["plot", "good.csv", "--svg-only", "--out", "disk/out"], "disk/out.svg"),
+    ] {
+        let mut shell = Command::new("sh");
+        shell.args(["-c", filled]).arg(place.phantom3().get_program()).args(arguments);
+        let shell = place.prepare(shell);
+        let Some(shell) = on_small_disk(&shell, &place.path("disk"), "size=16k") else { return };
+        let said = Running::start(shell).wait();
+        assert_eq!(said.status, Some(3), "{arguments:?}: {}{}", said.out, said.err);
+        assert_says(&said.err, &[file, "No space left on device (os error 28); make room on that disk"]);
+        assert!(!said.err.contains("can be written"), "{arguments:?}: {}", said.err);
+    }
+}
+
+#[test]
+fn a_file_of_events_that_a_full_disk_takes_not_is_called_so() {
+    let place = workplace();
+    fs::create_dir(place.path("disk")).expect("a directory");
+    let filled = "head -c 100000 /dev/zero > disk/all 2> /dev/null; exec \"$0\" \"$@\"";
+    let run = ["run", "scene.toml", "--clock", "virtual", "--seconds", "0.1", "--events", "disk/events.csv"];
+    let mut shell = Command::new("sh");
+    shell.args(["-c", filled]).arg(place.phantom3().get_program()).args(run);
+    let Some(shell) = on_small_disk(&place.prepare(shell), &place.path("disk"), "size=16k") else { return };
+    let said = Running::start(shell).wait();
+    assert_says(&said.err, &["the file of events disk/events.csv: No space left on device"]);
+    assert!(!said.err.contains("the recording"), "{}", said.err);
+}
+
+#[test]
+fn help_and_version_that_are_lost_are_no_success() {
+    let place = workplace();
+    for arguments in ["run --help", "--version", "help", "driver --help"] {
+        let script = format!("exec \"$0\" {arguments} > /dev/full");
+        let said = place.shell(&script, &[]);
+        assert_eq!(said.status, Some(3), "{arguments}: {}", said.err);
+        assert_says(&said.err, &["cannot write the standard output: No space left on device"]);
+        let said = place.shell(&format!("\"$0\" {arguments} | true; exec \"$0\" {arguments}"), &[]);
+        assert_eq!((said.status, said.err.as_str()), (Some(0), ""), "{arguments}");
+    }
+}
+
+/// A slash says that it is a directory.
+#[test]
+fn a_picture_into_a_directory_is_called_as_the_recording() {
+    let place = workplace();
+    with_recordings(&place);
+    fs::create_dir(place.path("pictures")).expect("a directory");
+    let said = place.run(["plot", "good.csv", "--svg-only", "--out", "pictures/"]);
+    assert_eq!((said.status, said.err.as_str()), (Some(0), ""), "{}", said.out);
+    assert!(place.path("pictures/good.svg").exists() && !place.path("pictures/.svg").exists());
+    assert_says(
+        &refused(&place, &["plot", "good.csv", "--out", "none/"]),
+        &["cannot write pictures into none"],
+    );
 }
 
 /// A shell leads a standard stream into a file that is read or written, too.
@@ -294,7 +370,7 @@ fn no_standard_stream_is_a_file_that_is_read_or_written_besides() {
     ];
     for (file, command, words) in cases {
         let before = fs::read(place.path(file)).expect("a file");
-        let mut shell = std::process::Command::new("sh");
+        let mut shell = Command::new("sh");
         shell.args(["-c", &format!("\"$0\" {command}")]).arg(place.phantom3().get_program());
         let said = Running::start(place.prepare(shell)).wait();
         assert_eq!(said.status, Some(2), "{command}: {}", said.err);

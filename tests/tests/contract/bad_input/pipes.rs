@@ -56,11 +56,11 @@ fn a_pipe_without_a_reader_holds_nobody_up() {
         (&[&run[..], &["--record", "pipe.csv"]].concat()[..], "pipe.csv", 2),
         (&[&run[..], &["--events", "pipe.csv"]].concat(), "pipe.csv", 2),
         (&[&run[..], &["--snapshot", "0.05:pipe.png"]].concat(), "pipe.png", 3),
-        (&["convert", "list.ini", "--out", "pipe.toml"], "pipe.toml", 2),
+        (&["convert", "list.ini", "--out", "pipe.toml"], "pipe.toml", 3),
         (&["export", "good.mcap", "pipe.csv"], "pipe.csv", 2),
         (&["export", "good.mcap", "--parquet", "pipe.csv"], "pipe.csv", 2),
         (&["plot", "good.mcap", "--out", "pipe"], "pipe.svg", 3),
-        (&["calibrate", "--pairs", "pairs.csv", "--plot", "pipe.svg"], "pipe.svg", 2),
+        (&["calibrate", "--pairs", "pairs.csv", "--plot", "pipe.svg"], "pipe.svg", 3),
     ] {
         let said = place.run(arguments);
         if said.err.contains(NO_PICTURES) {
