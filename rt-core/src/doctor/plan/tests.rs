@@ -1,4 +1,4 @@
-//! How the script quotes; what it says for whole machines is tested in `tests/doctor_plan.rs`.
+//! How the script quotes; what it says for whole machines is tested in `tests/doctor/plan.rs`.
 
 use super::*;
 

@@ -4,10 +4,8 @@
 //! page tables and scheduler, with the real sizes. No check depends on speed: what must never happen is
 //! looked for as often as the machine allows, and the only time-outs are those that tell a hang.
 
-mod common;
-
+use crate::common::{command, frame, info, info_of, is_command, is_frame, is_frame_of, wait_until};
 use bytemuck::Zeroable;
-use common::{command, frame, info, info_of, is_command, is_frame, is_frame_of, wait_until};
 use patience::limit;
 use patience::prelude::*;
 use proptest::prelude::*;
@@ -32,7 +30,7 @@ struct Shared {
 }
 
 fn shared() -> Shared {
-    shared_with(common::DEVICES)
+    shared_with(crate::common::DEVICES)
 }
 
 fn shared_with(devices: usize) -> Shared {
@@ -420,7 +418,7 @@ fn two_processes_exchange_whole_frames_and_commands_by_sleeping_on_each_other() 
     let memory = DriverMemory::create(&info()).unwrap();
     let mut server = Server::bind(&socket).unwrap();
     let mut child = std::process::Command::new(std::env::current_exe().unwrap())
-        .args(["--exact", "body_of_the_commanding_process"])
+        .args(["--exact", "concurrent::body_of_the_commanding_process"])
         .env(CHILD_SOCKET, &socket)
         .spawn()
         .unwrap();

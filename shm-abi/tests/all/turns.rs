@@ -1,8 +1,6 @@
 //! Turns of the server: how long each waits, and when a request was asked.
 
-mod common;
-
-use common::desk::{Desk, verdict};
+use crate::common::desk::{Desk, verdict};
 use patience::limit;
 use rustix::time::{ClockId, clock_gettime};
 use shm_abi::handshake::{Request, RequestKind, Verdict};

@@ -1,10 +1,8 @@
 //! Places where no driver answers, and places that a driver may not take.
 
-mod common;
-
-use common::desk::Desk;
-use common::directory;
-use common::host::Host;
+use crate::common::desk::Desk;
+use crate::common::directory;
+use crate::common::host::Host;
 use shm_abi::client::{self, AttachError};
 use shm_abi::server::{BindError, Server};
 use std::fs::File;

@@ -1,8 +1,6 @@
 //! Whatever lies in the machine's files: no panic, and no "pass" from a file that makes no sense.
 
-mod machines;
-
-use machines::{load, spec};
+use crate::machines::{load, spec};
 use proptest::prelude::*;
 use rt_core::doctor::machine::{FileStatus, Machine, Tree};
 use rt_core::doctor::plan::{self, PlanNames};
@@ -72,7 +70,7 @@ fn decides_nothing(path: &str) -> bool {
 }
 
 fn garble_each_file(garbage: &[u8], skip: impl Fn(&str) -> bool) {
-    for (name, cpu) in machines::ALL {
+    for (name, cpu) in crate::machines::ALL {
         let machine = load(name);
         for check in checks() {
             let (_, files) = ask(check, &machine, cpu);
@@ -111,10 +109,10 @@ proptest! {
     /// Everything at once: several files with any bytes, on any machine; table and plan as well.
     #[test]
     fn any_bytes_in_any_files_never_panic(
-        which in 0..machines::ALL.len(),
+        which in 0..crate::machines::ALL.len(),
         changes in proptest::collection::vec((any::<prop::sample::Index>(), any::<Vec<u8>>()), 1..20),
     ) {
-        let (name, cpu) = machines::ALL[which];
+        let (name, cpu) = crate::machines::ALL[which];
         let mut machine = load(name);
         let files: Vec<String> = machine.files.keys().cloned().collect();
         for (index, content) in changes {
@@ -126,10 +124,10 @@ proptest! {
     /// The same with words that nearly make sense.
     #[test]
     fn nearly_sensible_words_never_panic(
-        which in 0..machines::ALL.len(),
+        which in 0..crate::machines::ALL.len(),
         changes in proptest::collection::vec((any::<prop::sample::Index>(), "[-0-9,x \\[\\]a-f\n:./'\"$`\\\\]{0,40}"), 1..20),
     ) {
-        let (name, cpu) = machines::ALL[which];
+        let (name, cpu) = crate::machines::ALL[which];
         let mut machine = load(name);
         let files: Vec<String> = machine.files.keys().cloned().collect();
         for (index, content) in changes {

@@ -1,9 +1,7 @@
 //! Every version of the contract that was published is told in CHANGELOG.md and can still be compiled against.
 
-mod common;
-
-use common::c_header::{CHeader, current_version, directory_of};
-use common::golden::STRUCTURES;
+use crate::common::c_header::{CHeader, current_version, directory_of};
+use crate::common::golden::STRUCTURES;
 use shm_abi::LAYOUT_HASH;
 use std::path::Path;
 

@@ -1,8 +1,6 @@
 //! Each check with each verdict that it can give: the well set-up workstation with one thing changed.
 
-mod machines;
-
-use machines::{complaints, examine, find, load_with, spec};
+use crate::machines::{complaints, examine, find, load_with, spec};
 use rt_core::doctor::Verdict::{self, Fail, Pass, Unreadable, Warn};
 use rt_core::doctor::machine::LoopSpec;
 

@@ -1,10 +1,8 @@
 //! Clients and drivers of different make: whoever is refused reads what was found and what to do.
 
-mod common;
-
-use common::fake::{fake_server, hear, send};
-use common::host::Host;
-use common::{directory, info};
+use crate::common::fake::{fake_server, hear, send};
+use crate::common::host::Host;
+use crate::common::{directory, info};
 use patience::prelude::*;
 use patience::{accepted, limit, watched};
 use shm_abi::client::{self, AttachError};

@@ -1,8 +1,6 @@
 //! The fix plan: what it says for whole machines, that it is valid and harmless, and that it helps.
 
-mod machines;
-
-use machines::{complaints, examine, load, load_with, spec};
+use crate::machines::{complaints, examine, load, load_with, spec};
 use patience::prelude::*;
 use rt_core::cpu::parse_cpu_list;
 use rt_core::doctor::Verdict::Unreadable;
@@ -146,7 +144,7 @@ fn variants() -> Vec<(RecordedMachine, usize)> {
         "=== /sys/class/drm/card1/device/power/control\nauto\n",
     ];
     let laptops = changes.iter().map(|changes| (load_with("debian-laptop", changes), 7));
-    laptops.chain(machines::ALL.iter().map(|(name, cpu)| (load(name), *cpu))).collect()
+    laptops.chain(crate::machines::ALL.iter().map(|(name, cpu)| (load(name), *cpu))).collect()
 }
 
 #[test]

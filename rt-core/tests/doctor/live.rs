@@ -1,8 +1,6 @@
 //! The real file system and the real probes.
 
-mod machines;
-
-use machines::{load, spec};
+use crate::machines::{load, spec};
 use rt_core::doctor::live::{LiveProbes, LiveTree};
 use rt_core::doctor::machine::{Machine, Tree};
 use rt_core::doctor::probe::Probes;

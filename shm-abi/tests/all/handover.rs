@@ -1,12 +1,10 @@
 //! Who gets which memory: the real server and client over a real socket, and the one lease.
 
-mod common;
-
+use crate::common::desk::{Desk, SHORT, is_closed, verdict};
+use crate::common::fake::{receive, try_send};
+use crate::common::host::Host;
+use crate::common::{command, directory, frame, info, is_frame, own_pid, wait_until};
 use bytemuck::Zeroable;
-use common::desk::{Desk, SHORT, is_closed, verdict};
-use common::fake::{receive, try_send};
-use common::host::Host;
-use common::{command, directory, frame, info, is_frame, own_pid, wait_until};
 use patience::limit;
 use shm_abi::client;
 use shm_abi::handshake::{Request, RequestKind, Verdict};

@@ -1,9 +1,7 @@
 //! What nobody may do to the memory that was handed over, and what a bad neighbour can spoil.
 
-mod common;
-
+use crate::common::{command, info, info_of};
 use bytemuck::Zeroable;
-use common::{command, info, info_of};
 use shm_abi::segment::LeaseOffer;
 use shm_abi::{Command, CommanderMemory, CommanderView, DriverMemory, DriverSegment, DriverView};
 use std::fs::File;
@@ -237,7 +235,7 @@ fn a_commander_of_before_1_3_has_mapped_its_segment_once_it_publishes_or_has_had
     assert!(first.is_mapped());
     let begun = std::time::Instant::now();
     let second = LeaseOffer::create(2, before).unwrap();
-    common::wait_until("it has had time to", || second.is_mapped());
+    crate::common::wait_until("it has had time to", || second.is_mapped());
     assert!(begun.elapsed() >= shm_abi::segment::MAPPED_WITHIN);
 }
 
@@ -297,12 +295,12 @@ fn an_observer_of_the_same_user_can_spoil_neither_the_memory_nor_the_next_observ
     // It may close the file to itself by name; descriptors that are handed over are not asked for permission.
     file.set_permissions(std::fs::Permissions::from_mode(0o000)).unwrap();
     rustix::fs::flock(&file, rustix::fs::FlockOperation::NonBlockingLockExclusive).unwrap();
-    memory.write_frame(&common::frame(1));
+    memory.write_frame(&crate::common::frame(1));
     memory.ring(1, None);
     let next = DriverView::map(memory.fd()).unwrap();
-    let mut found = common::frame(9);
+    let mut found = crate::common::frame(9);
     next.read_frame(1, &mut found).unwrap();
-    assert!(common::is_frame(&found, 1));
+    assert!(crate::common::is_frame(&found, 1));
 }
 
 #[test]

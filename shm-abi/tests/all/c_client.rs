@@ -1,10 +1,8 @@
 //! A client in C, compiled against the committed headers, talks to the real server.
 
-mod common;
-
+use crate::common::fake::{fake_server, hear, send};
+use crate::common::{frame, info, wait_until};
 use bytemuck::Zeroable;
-use common::fake::{fake_server, hear, send};
-use common::{frame, info, wait_until};
 use patience::limit;
 use patience::prelude::*;
 use shm_abi::handshake::{Answer, Verdict};
@@ -23,7 +21,7 @@ fn root() -> &'static Path {
 
 /// The C compiler, looking for today's headers; `None` if there is none.
 fn compiler() -> Option<std::process::Command> {
-    let mut compiler = common::c_compiler::compiler()?;
+    let mut compiler = crate::common::c_compiler::compiler()?;
     compiler.arg("-I").arg(root().join("include"));
     Some(compiler)
 }
@@ -253,7 +251,7 @@ fn a_c_program_is_told_what_a_driver_of_an_older_version_does_not_know_and_who_m
         ),
     ];
     for (answer, expected) in cases {
-        let directory = common::directory();
+        let directory = crate::common::directory();
         let Some(program) = compiled() else { return };
         let socket = directory.path().join("driver.sock");
         let serving = fake_server(&socket, 1, move |mut stream| {

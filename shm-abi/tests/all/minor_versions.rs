@@ -3,15 +3,13 @@
 //! The old program is C, compiled with the headers as they were released (`tests/frozen`); the old driver is
 //! forged from the golden bytes of its version, laid out as its header says. Neither knows today's Rust types.
 
-mod common;
-
+use crate::common::c_compiler::reader_of;
+use crate::common::c_header::{CHeader, current_version};
+use crate::common::fake::{fake_server, hear, send};
+use crate::common::golden::Golden;
+use crate::common::host::Host;
+use crate::common::{directory, info_of, own_pid, wait_until};
 use bytemuck::Zeroable;
-use common::c_compiler::reader_of;
-use common::c_header::{CHeader, current_version};
-use common::fake::{fake_server, hear, send};
-use common::golden::Golden;
-use common::host::Host;
-use common::{directory, info_of, own_pid, wait_until};
 use patience::limit;
 use patience::prelude::*;
 use shm_abi::client::AttachError;

@@ -1,11 +1,9 @@
 //! Clients in any number, clients that say nothing, too much, too slowly or nonsense.
 
-mod common;
-
-use common::desk::{Desk, SHORT, is_closed, verdict};
-use common::fake::fake_server;
-use common::host::Host;
-use common::{directory, wait_until};
+use crate::common::desk::{Desk, SHORT, is_closed, verdict};
+use crate::common::fake::fake_server;
+use crate::common::host::Host;
+use crate::common::{directory, wait_until};
 use patience::limit;
 use patience::prelude::*;
 use shm_abi::client::{self, AttachError};
@@ -71,7 +69,7 @@ fn descriptors_that_a_client_sends_are_refused_where_the_kernel_can() {
     let mut desk = Desk::open();
     let stream = desk.connect();
     let (end, _other) = UnixStream::pair().unwrap();
-    match common::fake::try_send(&stream, b"x", &[end.as_fd()]) {
+    match crate::common::fake::try_send(&stream, b"x", &[end.as_fd()]) {
         Err(error) => assert_eq!(error.kind(), std::io::ErrorKind::PermissionDenied),
         Ok(()) => println!("skipped: this kernel is older than 6.16 and hands over descriptors unasked"),
     }

@@ -1,8 +1,6 @@
 //! What the doctor says of whole recorded machines.
 
-mod machines;
-
-use machines::{complaints, examine, find, load, spec};
+use crate::machines::{complaints, examine, find, load, spec};
 use rt_core::doctor::Verdict::{self, Fail, Unreadable, Warn};
 
 fn complaints_of(name: &str, cpu: usize) -> Vec<(&'static str, Verdict)> {
@@ -106,7 +104,7 @@ fn cards_are_no_business_of_these_checks() {
 
 #[test]
 fn every_complaint_has_a_reason_and_a_remedy_and_every_pass_has_neither_need() {
-    for (name, cpu) in machines::ALL {
+    for (name, cpu) in crate::machines::ALL {
         for finding in examine(&load(name), &spec(cpu)) {
             let remedy = finding.judgement.remedy.as_ref();
             assert_eq!(remedy.is_none(), finding.verdict() == Verdict::Pass, "{name}: {}", finding.id);

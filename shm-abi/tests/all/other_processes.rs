@@ -1,12 +1,10 @@
 //! What needs a process of its own: death by signal, another user, a limit of the whole process. Each test
 //! runs this binary again, with the body below and a variable that says which part of it.
 
-mod common;
-
+use crate::common::fake::{hear, send};
+use crate::common::host::Host;
+use crate::common::{directory, frame, info, is_frame, wait_until};
 use bytemuck::Zeroable;
-use common::fake::{hear, send};
-use common::host::Host;
-use common::{directory, frame, info, is_frame, wait_until};
 use patience::limit;
 use patience::prelude::*;
 use shm_abi::handshake::{Answer, Request, RequestKind, Verdict};
@@ -25,7 +23,7 @@ const SOCKET: &str = "SHM_ABI_TEST_SOCKET";
 
 fn process(binary: &Path, body: &str, socket: &Path) -> std::process::Command {
     let mut command = std::process::Command::new(binary);
-    command.args(["--exact", "body_of_another_process", "--nocapture"]);
+    command.args(["--exact", "other_processes::body_of_another_process", "--nocapture"]);
     command.env(BODY, body).env(SOCKET, socket).stdout(std::process::Stdio::piped());
     command
 }
