@@ -379,7 +379,7 @@ fn a_calibration_whose_figure_does_not_fit_says_that_the_layout_is_written() {
     let mut command = Command::new("sh");
     command.args(["-c", script]).arg(place.phantom3().get_program()).args(arguments);
     let said = Running::start(place.prepare(command)).wait();
-    assert!(said.out.contains("status 2"), "{}", said.out);
+    assert!(said.out.contains("status 3"), "{}", said.out);
     assert!(said.out.contains("p.svg: cannot be written: File too large"), "{}", said.out);
     assert!(said.out.contains("the layout is written to l.toml: only the figure is missing"), "{}", said.out);
     assert!(place.path("l.toml").exists() && !place.path("p.svg").exists());
