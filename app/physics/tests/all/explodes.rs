@@ -1,4 +1,6 @@
 //! Nothing explodes: whatever is asked, every number stays finite and every speed below its bound, and what is lost is reported.
+//!
+//! Thousands of hands: `cargo test --release -p physics --test all explodes:: -- --ignored` (a minute).
 #![allow(non_snake_case)]
 
 use crate::{common, noise};
@@ -47,9 +49,8 @@ fn crowded(noise: &mut Noise, settings: Settings, fingers: usize) -> World {
     World::new(entities, &bodies, settings, fingers)
 }
 
-#[test]
-fn fingers_that_jump_half_a_metre_in_a_tick_throw_nothing_beyond_its_bounds() {
-    for seed in 0..300 {
+fn jump_about(seeds: std::ops::Range<u64>) {
+    for seed in seeds {
         let noise = &mut Noise::new(seed);
         let (_, integrator) = Integrator::NAMES[noise.below(4)];
         let response =
@@ -78,6 +79,17 @@ fn fingers_that_jump_half_a_metre_in_a_tick_throw_nothing_beyond_its_bounds() {
             assert_within(&world, &settings, &format!("seed {seed}, tick {tick}, {settings:?}"));
         }
     }
+}
+
+#[test]
+fn fingers_that_jump_half_a_metre_in_a_tick_throw_nothing_beyond_its_bounds() {
+    jump_about(0..100);
+}
+
+#[test]
+#[ignore = "a minute; see the top of the file"]
+fn thousands_of_hands_that_jump_throw_nothing_beyond_its_bounds() {
+    jump_about(100..5000);
 }
 
 #[test]

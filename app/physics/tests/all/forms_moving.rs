@@ -92,7 +92,7 @@ fn forces_change_as_little_as_the_poses_do() {
     let (mut tried, mut jumped) = (0, Vec::new());
     for (name, a, b) in pairs() {
         let mut noise = Noise(5);
-        for _ in 0..6 {
+        for _ in 0..3 {
             let start = overlapping(&a, &b, 3e-4, &mut noise);
             let way = (noise.direction(), noise.direction());
             let [coarse, fine] = [300, 3000].map(|steps| largest_jump((&a, &b), &start, way, steps));

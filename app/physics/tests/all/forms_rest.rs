@@ -1,4 +1,6 @@
 //! Closed forms on a floor: they come to rest where statics says, and stay.
+//!
+//! More drops, and a minute: `cargo test --release -p physics --test all forms_rest:: -- --ignored` (half a minute).
 #![allow(non_snake_case)]
 
 use crate::{common, solids};
@@ -54,22 +56,22 @@ fn height_at_rest(name: &str, form: &Form, world: &World) -> f64 {
     }
 }
 
-#[test]
-fn every_form_that_is_dropped_comes_to_rest_where_statics_says_and_stays_there() {
+/// Drops each form so often, and looks at it for so many seconds once it rests.
+fn drop_all(drops: usize, seconds: u32) {
     for (seed, (name, form)) in (1..).zip(all()).filter(|(_, (name, _))| *name != "ellipsoid") {
         let mut noise = Noise(seed);
-        for _ in 0..4 {
+        for _ in 0..drops {
             let mut world = above_floor(form, noise.turn(), 0.02);
             let is_still = |world: &World| {
                 let body = world.body();
                 body.velocity_W.norm() < 1e-6 && body.angular_velocity_W().norm() < 1e-6 / 0.01
             };
             // Nothing damps a cylinder that rolls but its landing.
-            let mut seconds = 0;
+            let mut waited_s = 0;
             while !is_still(&world) {
-                assert!(seconds < 20, "{name}: {:?}", world.body());
+                assert!(waited_s < 20, "{name}: {:?}", world.body());
                 (0..1000).for_each(|_| drop(world.step(&[])));
-                seconds += 1;
+                waited_s += 1;
             }
             (0..5000).for_each(|_| drop(world.step(&[])));
             let at = world.entities[1].X_WB;
@@ -83,19 +85,30 @@ fn every_form_that_is_dropped_comes_to_rest_where_statics_says_and_stays_there()
                 at.translation.y
             );
             let rolls = world.body().velocity_W.norm() + 0.05 * world.body().angular_velocity_W().norm();
-            (0..60_000).for_each(|_| drop(world.step(&[])));
+            (0..1000 * seconds).for_each(|_| drop(world.step(&[])));
             let after = world.entities[1].X_WB;
             let crept = (after.translation.vector - at.translation.vector).norm();
             let turned = after.rotation.angle_to(&at.rotation);
             // What lies on its round side goes on rolling at what is left of its speed; all else holds to what the
             // solver leaves open.
-            assert!(crept < 1e-8 + 60.0 * rolls, "{name}: {crept} {rolls}");
-            assert!(turned < 1e-7 + 60.0 * rolls / 0.01, "{name}: {turned} {rolls}");
+            assert!(crept < 1e-8 + f64::from(seconds) * rolls, "{name}: {crept} {rolls}");
+            assert!(turned < 1e-7 + f64::from(seconds) * rolls / 0.01, "{name}: {turned} {rolls}");
             if world.made.rows > 2 {
                 assert!(rolls < 1e-10, "{name}: {rolls}");
             }
         }
     }
+}
+
+#[test]
+fn every_form_that_is_dropped_comes_to_rest_where_statics_says_and_stays_there() {
+    drop_all(3, 10);
+}
+
+#[test]
+#[ignore = "half a minute; see the top of the file"]
+fn every_form_that_is_dropped_often_comes_to_rest_where_statics_says_and_stays_for_a_minute() {
+    drop_all(12, 60);
 }
 
 #[test]

@@ -276,7 +276,8 @@ fn all_stays_finite_however_they_overlap() {
         seed = seed.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
         (seed >> 33) as f64 / f64::from(1_u32 << 31) * 2.0 - 1.0
     };
-    for case in 0..300 {
+    // Each pair three times, once all but in the same place.
+    for case in 0..150 {
         let (a, b) = (case % shapes.len(), case / shapes.len() % 5);
         let mut vector = |scale: f64| Vector3::new(random(), random(), random()) * scale;
         let pose = Isometry3::from_parts(

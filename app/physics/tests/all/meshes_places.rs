@@ -1,4 +1,6 @@
 //! Meshes that touch in several places at once: pegs in holes, balls in cups, arches over bars.
+//!
+//! In every way that they are put there: `cargo test --release -p physics --test all meshes_places:: -- --ignored` (half a minute).
 #![allow(non_snake_case)]
 
 use crate::{common, meshes};
@@ -109,9 +111,11 @@ fn gives(name: &str, axis: usize) -> f64 {
 
 #[test]
 fn a_peg_in_a_hole_is_stopped_by_floor_and_walls_and_comes_out_again() {
-    for (hole_name, hole) in &holes() {
-        for (name, peg) in &pegs() {
-            for way in [Vector3::new(-0.7, -0.7, 0.0), Vector3::new(0.5, -0.5, 0.7)] {
+    let ways = [Vector3::new(-0.7, -0.7, 0.0), Vector3::new(0.5, -0.5, 0.7)];
+    for (number, (hole_name, hole)) in holes().iter().enumerate() {
+        for (turn, (name, peg)) in (number..).zip(&pegs()) {
+            // Each peg goes both ways, one in each hole.
+            for way in [ways[turn % 2]] {
                 let gravity_W = way.normalize() * G;
                 let walls = vec![fixed(hole.clone(), Isometry3::identity())];
                 let at = Isometry3::translation(0.0, 0.0201, 0.0);
@@ -210,16 +214,17 @@ fn upright(points: u32, inner: f64) -> Shape {
     build(soup).into()
 }
 
-#[test]
-fn what_touches_with_many_points_as_good_as_each_other_rests_on_the_same_ones() {
+/// Every prism in every hole, in each `of`-th way that they are turned and pulled.
+fn prisms_come_to_rest(of: usize) {
     let ways = [[0.5, -0.5, 0.7], [-0.45, -0.63, -0.72], [-0.61, -0.49, -0.55]].map(Vector3::from);
     let prisms = [(12, 0.01), (8, 0.01), (40, 0.01), (18, 0.008)];
-    for (hole_name, hole) in &holes() {
-        for (points, inner) in prisms {
-            for (way, turned) in ways.iter().flat_map(|way| [0.0, FRAC_PI_2].map(|turned| (way, turned))) {
+    let ways: Vec<_> = ways.iter().flat_map(|way| [0.0, FRAC_PI_2].map(|turned| (way, turned))).collect();
+    for (number, (hole_name, hole)) in holes().iter().enumerate() {
+        for (turn, (points, inner)) in (number..).zip(prisms) {
+            for (way, turned) in ways.iter().skip(turn % of).step_by(of) {
                 let at = Isometry3::from_parts(
                     Vector3::new(0.0, 0.0101, 0.0).into(),
-                    UnitQuaternion::from_axis_angle(&Vector3::x_axis(), turned),
+                    UnitQuaternion::from_axis_angle(&Vector3::x_axis(), *turned),
                 );
                 let gravity_W = way.normalize() * G;
                 let walls = vec![fixed(hole.clone(), Isometry3::identity())];
@@ -239,6 +244,17 @@ fn what_touches_with_many_points_as_good_as_each_other_rests_on_the_same_ones() 
             }
         }
     }
+}
+
+#[test]
+fn what_touches_with_many_points_as_good_as_each_other_rests_on_the_same_ones() {
+    prisms_come_to_rest(5);
+}
+
+#[test]
+#[ignore = "half a minute; see the top of the file"]
+fn whichever_way_it_is_pulled_what_touches_with_many_points_rests_on_the_same_ones() {
+    prisms_come_to_rest(1);
 }
 
 /// Walls and floor of the hole as boxes of which each knows but itself.
@@ -322,11 +338,11 @@ fn an_arch_over_a_bar_hangs_on_it_and_is_held_by_it_on_either_side() {
     }
 }
 
-#[test]
-fn a_peg_thrown_about_in_its_hole_gains_no_energy() {
+/// Every peg in every hole, in each of these ways: along, and spinning.
+fn throw_pegs(throws: &[(f64, f64)]) {
     for (hole_name, hole) in &holes() {
         for (name, peg) in &pegs() {
-            for (way, spin) in [(0.1, 0.5), (-0.07, -1.0)] {
+            for &(way, spin) in throws {
                 let start = Isometry3::translation(0.0, 0.0201, 0.0);
                 let peg = object(peg.clone(), start, 1000.0, 0.0).with_damping(0.2).unwrap();
                 let thrown =
@@ -347,4 +363,15 @@ fn a_peg_thrown_about_in_its_hole_gains_no_energy() {
             }
         }
     }
+}
+
+#[test]
+fn a_peg_thrown_about_in_its_hole_gains_no_energy() {
+    throw_pegs(&[(0.1, 0.5)]);
+}
+
+#[test]
+#[ignore = "half a minute; see the top of the file"]
+fn a_peg_thrown_about_in_many_ways_gains_no_energy() {
+    throw_pegs(&[(-0.07, -1.0), (0.2, 0.0), (0.05, 5.0), (-0.15, 2.0)]);
 }

@@ -1,7 +1,8 @@
 //! Rings that go into other solids as deep as they like, and through them: they are pressed in every pose, by forces that
 //! change as little as the poses do, and gain nothing.
 //!
-//! Hundreds of paths: `cargo test --release -p physics --test all rings_through:: -- --ignored` (some minutes).
+//! Hundreds of paths, and more poses and throws: `cargo test --release -p physics --test all rings_through:: -- --ignored`
+//! (some minutes).
 #![allow(non_snake_case)]
 
 use crate::{common, meshes, noise};
@@ -142,14 +143,14 @@ fn touches(points: &[ContactPoint]) -> bool {
     points.iter().any(|point| point.gap_m < 0.0)
 }
 
-#[test]
-fn wherever_a_ring_is_put_into_a_solid_it_touches_it() {
+/// So many poses of each ring in each solid.
+fn put_into_all(seed: u64, poses: usize) {
     for [ring_m, tube_m] in RINGS {
         let ring: Shape = Torus::new(ring_m, tube_m).unwrap().into();
         for through in all(tube_m) {
-            let noise = &mut Noise::new(3);
+            let noise = &mut Noise::new(seed);
             let mut deep = 0;
-            for _ in 0..2000 {
+            for _ in 0..poses {
                 let X = Isometry3::from_parts(noise.vector(0.05).into(), noise.turn());
                 if through.deepest_m(ring_m, &X, 360) < 0.5 * tube_m {
                     continue;
@@ -158,9 +159,20 @@ fn wherever_a_ring_is_put_into_a_solid_it_touches_it() {
                 let points = through.touched_by(&ring, &X, &mut PairMemory::default());
                 assert!(touches(&points), "{tube_m} {}: {X} {points:?}", through.name);
             }
-            assert!(deep > 150, "{tube_m} {}: {deep}", through.name);
+            assert!(deep * 14 > poses, "{tube_m} {}: {deep}", through.name);
         }
     }
+}
+
+#[test]
+fn wherever_a_ring_is_put_into_a_solid_it_touches_it() {
+    put_into_all(3, 500);
+}
+
+#[test]
+#[ignore = "half a minute; see the top of the file"]
+fn wherever_of_thousands_of_places_a_ring_is_put_into_a_solid_it_touches_it() {
+    put_into_all(4, 5000);
 }
 
 /// Steps of 10 um and up to 1 mrad about the ring's middle.
@@ -277,11 +289,13 @@ fn is_jump(
     largest_m > 0.4 * change_m
 }
 
-fn go_through_all(seed: u64, paths: usize) {
+/// Every solid with every `of`-th ring: all rings go through some, and each solid is gone through.
+fn go_through_all(seed: u64, paths: usize, of: usize) {
     let noise = &mut Noise::new(seed);
-    let mut all_seen = Seen::default();
-    for radii_m in RINGS {
-        for through in all(radii_m[1]) {
+    let (mut all_seen, mut pairs) = (Seen::default(), 0);
+    for (number, radii_m) in RINGS.into_iter().enumerate() {
+        for (_, through) in (number..).zip(all(radii_m[1])).filter(|(turn, _)| turn % of == 0) {
+            pairs += 1;
             let mut seen = Seen::default();
             (0..paths).for_each(|_| go(&through, radii_m, &Path::new(noise), &mut seen));
             println!("{:6} {:22} {seen:?}", radii_m[1], through.name);
@@ -289,20 +303,20 @@ fn go_through_all(seed: u64, paths: usize) {
             all_seen.jumps += seen.jumps;
         }
     }
-    assert!(all_seen.deep > 1000 * paths * RINGS.len() * 14, "{all_seen:?}");
+    assert!(all_seen.deep > 1000 * paths * pairs, "{all_seen:?}");
     // Places' own.
     assert!(all_seen.jumps * 200 < all_seen.deep, "{all_seen:?}");
 }
 
 #[test]
 fn on_its_way_through_a_solid_a_ring_is_pressed_all_the_time_and_by_forces_that_do_not_jump() {
-    go_through_all(5, 1);
+    go_through_all(5, 1, RINGS.len());
 }
 
 #[test]
 #[ignore = "some minutes; see the top of the file"]
 fn on_hundreds_of_ways_through_solids_rings_are_pressed_all_the_time_and_by_forces_that_do_not_jump() {
-    go_through_all(9, 8);
+    go_through_all(9, 8, 1);
 }
 
 #[test]

@@ -156,9 +156,7 @@ fn orientation_goes_where_tiny_steps_go() {
 
 #[test]
 fn momentum_is_kept_to_rounding_and_energy_within_a_percent_at_any_spin_rate() {
-    for (spin, ticks) in
-        [(1.0, 60_000), (100.0, 60_000), (2000.0, 20_000), (1e4, 5000), (1e5, 500), (1e7, 500)]
-    {
+    for (spin, ticks) in [(1.0, 20_000), (100.0, 5000), (2000.0, 5000), (1e4, 5000), (1e5, 500), (1e7, 500)] {
         for moments in [MOMENTS, [1e-6, 1e-4, 1.005e-4], [1e-4, 1e-4, 1.9e-4], [1e-4; 3]] {
             let start = spinning(moments, Vector3::new(0.3, 0.5, 0.8) * spin, UnitQuaternion::identity());
             let mut space = Space::new(start, Integrator::Implicit);
