@@ -3,6 +3,8 @@
 
 use crate::{common, counting, effects};
 
+use std::sync::{Arc, OnceLock};
+
 use common::*;
 use counting::CALLS;
 use effects::{Felt, limits};
@@ -29,7 +31,10 @@ fn all() -> Felt {
     ];
     let magnet = Magnetism::new(1.0, 0.01, &limits).unwrap();
     let hum = Vibration::new(100.0, 0.3, 1.0, &limits).unwrap();
-    let mesh = std::sync::Arc::new(Mesh::build(make::bumpy_sphere(60, 31, 0.02)).unwrap().0);
+    // Built once for all cases.
+    static MESH: OnceLock<Arc<Mesh>> = OnceLock::new();
+    let mesh =
+        MESH.get_or_init(|| Arc::new(Mesh::build(make::bumpy_sphere(60, 31, 0.02)).unwrap().0)).clone();
     let dressed = |entity: Entity| entity.with_magnetism(magnet).with_vibration(hum);
     let cube = Cuboid::new([0.02; 3]).unwrap();
     Felt::new(fields, guides, vec![dressed(entity(cube, stiction())), dressed(entity(mesh, stiction()))])

@@ -129,9 +129,9 @@ fn crept(friction: Friction, seed: u64) -> f64 {
     at.unwrap() / BIAS
 }
 
-/// The same of Hayward and Armstrong's equation, `dw = alpha(z) z |dx|`, in steps of a hundredth of a tick's path.
+/// The same of Hayward and Armstrong's equation, `dw = alpha(z) z |dx|`, in steps of a 25th of a tick's path.
 fn crept_slowly(alpha: impl Fn(f64, f64) -> f64, seed: u64) -> f64 {
-    const STEPS: u32 = 100;
+    const STEPS: u32 = 25;
     let mut w = Vector3::zeros();
     let mut before_W = Vector3::new(0.0, -DEPTH, 0.0);
     for hip_W in biased(seed) {

@@ -56,7 +56,7 @@ fn roam_all_surfaces(ticks: u32) {
 
 #[test]
 fn no_tick_in_any_surface_adds_more_force_than_the_hands_way() {
-    roam_all_surfaces(1500);
+    roam_all_surfaces(500);
 }
 
 /// A hundred million ticks.

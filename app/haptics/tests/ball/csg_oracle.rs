@@ -2,8 +2,9 @@
 //!
 //! The sample is slow and obvious: rays through a grid of points, along which the boolean expression of the solid is
 //! bisected wherever it changes. Nothing is shared with the trees. Its points lie on the boundary to 1e-12 m: one that
-//! is nearer to a ball's centre than the radius is a leak, however coarse the sample is.
+//! is nearer to a ball's centre than the radius is a leak, however coarse the sample is. It is taken where it is asked for.
 
+use std::cell::RefCell;
 use std::collections::HashMap;
 
 use crate::common::meshes::Roaming;
@@ -12,64 +13,74 @@ use crate::trees::{self, Inside, random_tree, touchable};
 use haptics::{Entity, FingerOutput, Friction};
 use nalgebra::Vector3;
 
-/// Points of a boundary, in boxes.
-struct Sample {
-    boxes: HashMap<[i32; 3], Vec<Vector3<f64>>>,
-    pitch_m: f64,
+/// Points of a boundary, in boxes: of each node the crossings on the way to it from those before it.
+struct Sample<'c> {
+    contains: &'c Inside<'c>,
+    boxes: RefCell<HashMap<[i32; 3], Vec<Vector3<f64>>>>,
 }
 
-const BOX_M: f64 = 2e-3;
+/// Between nodes (m), and how many of them a box has along each side.
+const PITCH_M: f64 = 5e-4;
+const NODES: i32 = 4;
+const BOX_M: f64 = NODES as f64 * PITCH_M;
 
-impl Sample {
-    fn of(contains: &Inside<'_>, size_m: f64, pitch_m: f64) -> Self {
-        let mut here = Self { boxes: HashMap::new(), pitch_m };
-        let count = (2.2 * size_m / pitch_m) as i32;
-        let at = |i: i32| (f64::from(i) + 0.4142) * pitch_m - 1.1 * size_m;
-        let node = |[i, j, k]: [i32; 3]| Vector3::new(at(i), at(j), at(k));
-        let index = |[i, j, k]: [i32; 3]| ((i * count + j) * count + k) as usize;
-        // Rays along all three axes meet in the same nodes: each is asked once.
-        let is_inside: Vec<bool> = nodes(count).map(|n| contains(&node(n))).collect();
-        for n in nodes(count) {
-            for axis in 0..3 {
-                let mut before = n;
-                before[axis] -= 1;
-                if n[axis] > 0 && is_inside[index(before)] != is_inside[index(n)] {
-                    here.add(bisected(contains, node(before), node(n)));
+impl<'c> Sample<'c> {
+    fn of(contains: &'c Inside<'c>) -> Self {
+        Self { contains, boxes: RefCell::default() }
+    }
+
+    /// Where the boundary is crossed on the way to a box' nodes.
+    fn crossings(&self, number: [i32; 3]) -> Vec<Vector3<f64>> {
+        // Off the planes of the solids.
+        let node = |n: [i32; 3]| Vector3::from(n.map(|i| (f64::from(i) + 0.4142) * PITCH_M));
+        let here = |at: i32| {
+            let side = NODES + 1;
+            let within = [at / (side * side), at / side % side, at % side];
+            std::array::from_fn(|axis| number[axis] * NODES - 1 + within[axis])
+        };
+        // Rays along all three axes meet in the same nodes: each is asked once, and those before the first ones.
+        let steps = [(NODES + 1).pow(2), NODES + 1, 1];
+        let is_inside: Vec<bool> =
+            (0..(NODES + 1).pow(3)).map(|at| (self.contains)(&node(here(at)))).collect();
+        let mut found = Vec::new();
+        for at in 0..(NODES + 1).pow(3) {
+            if steps.iter().any(|step| at / step % (NODES + 1) == 0) {
+                continue;
+            }
+            for step in steps {
+                if is_inside[(at - step) as usize] != is_inside[at as usize] {
+                    found.push(bisected(self.contains, node(here(at - step)), node(here(at))));
                 }
             }
         }
-        here
-    }
-
-    fn add(&mut self, p: Vector3<f64>) {
-        self.boxes.entry(key(&p)).or_default().push(p);
+        found
     }
 
     /// How far the nearest point is, up to `at_most_m`.
     fn distance(&self, p: &Vector3<f64>, at_most_m: f64) -> f64 {
-        let reach = (at_most_m / BOX_M).ceil() as i32;
-        let [a, b, c] = key(p);
+        let mut boxes = self.boxes.borrow_mut();
         let mut least = at_most_m * at_most_m;
-        for i in -reach..=reach {
-            for j in -reach..=reach {
-                for k in -reach..=reach {
-                    for q in self.boxes.get(&[a + i, b + j, c + k]).into_iter().flatten() {
-                        least = least.min((q - p).norm_squared());
+        let number = |x: f64| (x / BOX_M).floor() as i32;
+        // A box' crossings reach as far below it as nodes are apart.
+        let [a, b, c]: [_; 3] =
+            std::array::from_fn(|axis| number(p[axis] - at_most_m)..=number(p[axis] + at_most_m + PITCH_M));
+        for i in a {
+            for j in b.clone() {
+                for k in c.clone() {
+                    let low = Vector3::new(f64::from(i), f64::from(j), f64::from(k)) * BOX_M;
+                    let nearest = p.sup(&low.add_scalar(-PITCH_M)).inf(&low.add_scalar(BOX_M));
+                    if (nearest - p).norm_squared() > least {
+                        continue;
+                    }
+                    let crossings = boxes.entry([i, j, k]).or_insert_with(|| self.crossings([i, j, k]));
+                    for q in crossings {
+                        least = least.min((*q - p).norm_squared());
                     }
                 }
             }
         }
         least.sqrt()
     }
-}
-
-/// All nodes of a cubic grid, the last coordinate first.
-fn nodes(count: i32) -> impl Iterator<Item = [i32; 3]> {
-    (0..count).flat_map(move |i| (0..count).flat_map(move |j| (0..count).map(move |k| [i, j, k])))
-}
-
-fn key(p: &Vector3<f64>) -> [i32; 3] {
-    [p.x, p.y, p.z].map(|x| (x / BOX_M).floor() as i32)
 }
 
 fn bisected(contains: &Inside<'_>, mut a: Vector3<f64>, mut b: Vector3<f64>) -> Vector3<f64> {
@@ -87,7 +98,7 @@ fn roam(
     name: &str,
     entity: &Entity,
     contains: &Inside<'_>,
-    sample: &Sample,
+    sample: &Sample<'_>,
     size_m: f64,
     radius_m: f64,
 ) -> [u32; 3] {
@@ -134,7 +145,7 @@ fn roam(
 /// Whether all steps that lead nearer to the HIP lead into the material.
 fn is_settled(
     contains: &Inside<'_>,
-    sample: &Sample,
+    sample: &Sample<'_>,
     out: &FingerOutput,
     hip: &Vector3<f64>,
     radius_m: f64,
@@ -143,7 +154,7 @@ fn is_settled(
     let way = hip - centre;
     let length = way.norm();
     // What a sample of this pitch does not see of a surface that a ball of this radius touches.
-    let unseen_m = sample.pitch_m * sample.pitch_m / radius_m;
+    let unseen_m = PITCH_M * PITCH_M / radius_m;
     let step_m = (10.0 * unseen_m).max(0.02 * radius_m);
     if length < 2.0 * step_m {
         return true;
@@ -174,7 +185,7 @@ fn reaches_into(contains: &Inside<'_>, centre: &Vector3<f64>, radius_m: f64) -> 
 fn on_every_tree_a_ball_keeps_its_distance_and_rests_where_the_spring_wants_it() {
     let mut bad = Vec::new();
     for tree in trees::all() {
-        let sample = Sample::of(&tree.contains, tree.size_m, 5e-4);
+        let sample = Sample::of(&tree.contains);
         let entity = touchable(&tree.tree, Friction::None);
         for radius_m in [1.5e-3, 5e-3] {
             let [touched, leaks, unsettled] =
@@ -196,7 +207,7 @@ fn on_random_trees_too() {
     let mut bad = Vec::new();
     for seed in 0..8 {
         let (tree, contains) = random_tree(1000 + seed);
-        let sample = Sample::of(&*contains, 0.05, 5e-4);
+        let sample = Sample::of(&*contains);
         let entity = touchable(&tree, Friction::None);
         let radius_m = [2e-3, 4e-3, 8e-3][seed as usize % 3];
         let name = format!("random {seed}");

@@ -94,11 +94,15 @@ impl Solid {
         self.descend(p, self.coordinates(at), 1e-4)
     }
 
-    /// Fraction of `from -> to` at which the material is first met: ten thousand samples, then bisection.
+    /// Fraction of `from -> to` at which the material is first met: ten thousand samples, then bisection. Those that are
+    /// farther out than the size are not in it.
     pub(crate) fn first_crossing(&self, from: &Vector3<f64>, to: &Vector3<f64>) -> Option<f64> {
         let inside = |fraction: f64| (self.contains)(&(from + (to - from) * fraction));
         let n = 10_000;
-        let first = (0..=n).find(|&i| inside(f64::from(i) / f64::from(n)))?;
+        let is_near = |i: &i32| {
+            (from + (to - from) * (f64::from(*i) / f64::from(n))).amax() <= self.size_m * (1.0 + 1e-9)
+        };
+        let first = (0..=n).filter(is_near).find(|&i| inside(f64::from(i) / f64::from(n)))?;
         let (mut low, mut high) = (f64::from(first - 1) / f64::from(n), f64::from(first) / f64::from(n));
         for _ in 0..60 {
             let middle = 0.5 * (low + high);

@@ -218,7 +218,7 @@ pub(crate) fn random_tree(seed: u64) -> (CsgTree, Box<Inside<'static>>) {
             }
             1 => {
                 let (r, l) = (0.01 * size, 0.05 * size);
-                let inside = move |p: &Vector3<f64>| p.x.hypot(p.z) <= r && 2.0 * p.y.abs() <= l;
+                let inside = move |p: &Vector3<f64>| p.x * p.x + p.z * p.z <= r * r && 2.0 * p.y.abs() <= l;
                 (CsgPart::new(Cylinder::new(r, l).unwrap(), pose), Box::new(inside))
             }
             _ => {

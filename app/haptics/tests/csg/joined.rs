@@ -260,12 +260,12 @@ fn check(name: &str, (faults, wrong): (Faults, Vec<u64>)) {
 
 #[test]
 fn joined_trees_hold_a_finger_at_the_nearest_place_by_its_spring() {
-    check("joined", walk_over(0..200, joined));
+    check("joined", walk_over(0..60, joined));
 }
 
 #[test]
 fn crossing_trees_hold_a_finger_at_the_nearest_place_by_its_spring() {
-    check("crossing", walk_over(0..150, |seed| random_tree(seed).0));
+    check("crossing", walk_over(0..45, |seed| random_tree(seed).0));
 }
 
 /// Both, a hundred thousand trees and more: `cargo test --release -p haptics --test csg joined:: -- --ignored --nocapture`.

@@ -51,9 +51,12 @@ impl Marching {
         vertex
     }
 
-    fn tetrahedron(&mut self, nodes: [Node; 4]) {
-        let (inside, outside): (Vec<Node>, Vec<Node>) =
-            nodes.iter().partition(|node| (self.contains)(&self.at(**node)));
+    /// Four nodes, and which of them are inside.
+    fn tetrahedron(&mut self, nodes: [(Node, bool); 4]) {
+        let of = |side: bool| -> Vec<Node> {
+            nodes.iter().filter(|(_, is_inside)| *is_inside == side).map(|(node, _)| *node).collect()
+        };
+        let (inside, outside) = (of(true), of(false));
         let faces: Vec<[u32; 3]> = match (&inside[..], &outside[..]) {
             (&[a], &[b, c, d]) => vec![[self.cut(a, b), self.cut(a, c), self.cut(a, d)]],
             (&[a, b, c], &[d]) => vec![[self.cut(a, d), self.cut(b, d), self.cut(c, d)]],
@@ -77,12 +80,22 @@ fn marched(tree: &Tree, cells: i32) -> Arc<Mesh> {
     let pitch_m = 1.05 * tree.size_m / f64::from(cells);
     let soup = TriangleSoup { vertices: Vec::new(), faces: Vec::new() };
     let mut marching = Marching { contains: tree.contains, pitch_m, soup, vertices: HashMap::new() };
-    for x in -cells - 1..cells + 1 {
-        for y in -cells - 1..cells + 1 {
-            for z in -cells - 1..cells + 1 {
-                let corner = |i: usize| [x + (i & 1) as i32, y + (i >> 1 & 1) as i32, z + (i >> 2) as i32];
+    // Each node is a corner of eight cubes, and asked once.
+    let (first, count) = (-cells - 1, 2 * cells + 3);
+    let is_inside: Vec<bool> = (0..count.pow(3))
+        .map(|i| [i / (count * count), i / count % count, i % count].map(|i| first + i))
+        .map(|node| (tree.contains)(&marching.at(node)))
+        .collect();
+    let place = |node: Node| node.iter().fold(0, |place, i| place * count + (i - first)) as usize;
+    for x in first..cells + 1 {
+        for y in first..cells + 1 {
+            for z in first..cells + 1 {
+                let corner = |i: usize| {
+                    let node = [x + (i & 1) as i32, y + (i >> 1 & 1) as i32, z + (i >> 2) as i32];
+                    (node, is_inside[place(node)])
+                };
                 // Most cubes are all inside or all outside, and have no part of the surface.
-                let inside = (0..8).filter(|i| (tree.contains)(&marching.at(corner(*i)))).count();
+                let inside = (0..8).filter(|i| corner(*i).1).count();
                 if inside == 0 || inside == 8 {
                     continue;
                 }

@@ -1,11 +1,20 @@
 //! How well meshes stand for the ball that they approximate: forces along the standard path.
 
+use std::sync::{Arc, OnceLock};
+
 use crate::common::meshes::*;
 use crate::common::path::{self, Phase, R, RadiusAt};
 use crate::common::*;
 use crate::mesh_oracle::descent::Descent;
+use haptics::mesh::Mesh;
 use haptics::{Entity, Finger, Friction};
 use nalgebra::Vector3;
+
+/// A million triangles, built once for all tests.
+fn bumpy_ball_of_a_million() -> Arc<Mesh> {
+    static BALL: OnceLock<Arc<Mesh>> = OnceLock::new();
+    Arc::clone(BALL.get_or_init(|| bumpy_sphere(1000)))
+}
 
 /// HIP and force of every tick of the slide over the ball.
 fn slide(meridians: usize, friction: Friction) -> Vec<(Vector3<f64>, Vector3<f64>)> {
@@ -125,7 +134,7 @@ fn with_friction_the_slide_is_as_smooth_and_drags_with_its_coefficient() {
 
 #[test]
 fn under_a_bumpy_ball_of_a_million_triangles_no_contact_is_lost_or_met_anew() {
-    let mesh = bumpy_sphere(1000);
+    let mesh = bumpy_ball_of_a_million();
     for friction in [Friction::None, Friction::Coulomb { mu: 0.5 }] {
         let ball = touchable(&mesh, friction);
         // With a ramp: what is found inside begins with a hundredth of its force.
@@ -157,7 +166,7 @@ fn under_a_bumpy_ball_of_a_million_triangles_no_contact_is_lost_or_met_anew() {
 
 #[test]
 fn on_a_bumpy_ball_of_a_million_triangles_the_force_stays_that_of_the_depth() {
-    let slide = slide_over(&touchable(&bumpy_sphere(1000), Friction::None), path::bumpy);
+    let slide = slide_over(&touchable(&bumpy_ball_of_a_million(), Friction::None), path::bumpy);
     // Around the pole bumps are needles, 3 mm high and 4 mm apart: there a god-object rests in the dale it is in, and
     // the HIP goes on under the hills.
     let forces_n: Vec<_> = slide[500..].iter().map(|(_, force)| force.norm()).collect();

@@ -450,8 +450,10 @@ fn an_open_sheet_keeps_the_winding_of_most_of_its_faces() {
 #[test]
 fn scaling_the_input_scales_the_mesh_and_changes_nothing_else() {
     let mut soups = generators();
-    // Needles at the poles, 6 um long and 40 nm wide.
-    soups.push(("fine sphere", make::uv_sphere(1000, 500, 0.002)));
+    // Needles at the poles, 6 um long and 40 nm wide: of the ball its caps.
+    let mut fine = make::uv_sphere(1000, 500, 0.002);
+    fine.faces.retain(|face| fine.vertices[face[0] as usize].y.abs() > 0.99 * 0.002);
+    soups.push(("caps of a fine sphere", fine));
     for (name, soup) in soups {
         let (mesh, report) = build(soup.clone());
         for scale in [1e-3, 1e3] {

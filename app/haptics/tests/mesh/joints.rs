@@ -356,16 +356,18 @@ fn a_hole_whose_lid_has_no_area_stays_open_and_leaves_no_vertex() {
 /// The vertex in the middle of a lid had more faces than a vertex may have, and the mesh was refused for it.
 #[test]
 fn a_hole_of_more_corners_than_a_vertex_may_have_stays_open() {
-    // A vase: rings of 2^15 corners at its mouth, 2^14 below, ... 4 at its foot.
+    // A beaker: rings of 2^15 corners at its mouth, 2^14 below, ... 4 at its foot, each as far below as its corners are apart:
+    // needles would be near each other by thousands.
     let mut soup = TriangleSoup::default();
+    let (radius, mut height) = (0.1, 0.0);
     for level in (2..=15).rev() {
         let count = 1_u32 << level;
         let first = soup.vertices.len() as u32;
-        let radius = 0.1 + 0.1 * f64::from(15 - level);
+        height -= radius * std::f64::consts::TAU / f64::from(count);
         let corner = |i: u32| (f64::from(i) * std::f64::consts::TAU / f64::from(count)).sin_cos();
         soup.vertices.extend((0..count).map(|i| {
             let (sin, cos) = corner(i);
-            point(radius * cos, 0.1 * f64::from(level), radius * sin)
+            point(radius * cos, height, radius * sin)
         }));
         if level < 15 {
             let above = |i: u32| first - 2 * count + i % (2 * count);

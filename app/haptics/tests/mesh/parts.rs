@@ -77,10 +77,15 @@ fn inside_solids_that_overlap_or_cut_through_themselves_no_finger_is_lost() {
             let entity = touchable(&mesh, friction);
             let (mut finger, mut roaming) = (point_finger(), Roaming::new(9, 0.09, 5e-4));
             let (mut inside, mut last) = (0, None);
-            for tick in 0..50_000 {
+            let (low, high) = mesh.vertices().iter().fold(
+                (Vector3::repeat(f64::INFINITY), Vector3::repeat(f64::NEG_INFINITY)),
+                |(low, high), v| (low.inf(v), high.sup(v)),
+            );
+            for tick in 0..25_000 {
                 let hip = roaming.next();
                 let out = step(&mut finger, &entity, &hip);
-                let is_inside = winding_number(&mesh, &hip) > 0.5;
+                // Outside of the box around it nothing is inside.
+                let is_inside = hip == hip.sup(&low).inf(&high) && winding_number(&mesh, &hip) > 0.5;
                 inside += u32::from(is_inside);
                 let told = || format!("{name}, tick {tick}, {hip:?}: {out:?}");
                 assert!(out.entity.is_some() || !is_inside, "lost: {}", told());
@@ -92,7 +97,7 @@ fn inside_solids_that_overlap_or_cut_through_themselves_no_finger_is_lost() {
                     assert!(mesh.first_hit(&last_hip, &hip).is_some(), "drawn: {}", told());
                 }
             }
-            assert!(inside > 1500, "{name}: {inside}");
+            assert!(inside > 750, "{name}: {inside}");
         }
     }
 }

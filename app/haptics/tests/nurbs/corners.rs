@@ -220,8 +220,11 @@ fn nobody_comes_in_at_edges_corners_and_tips_unnoticed() {
                 assert!(finger.contact(0).is_some(), "{name} {trial}: {from:?} -> {to:?} in {ticks}");
             }
             // A way that keeps off the solid meets nothing.
-            let is_off = (0..=2000).all(|k| outside_m(&from.lerp(&to, f64::from(k) / 2000.0)) > 2e-4);
-            assert!(!is_off || finger.contact(0).is_none(), "{name} {trial}: {from:?} -> {to:?}");
+            let mut way = (0..=2000).map(|k| from.lerp(&to, f64::from(k) / 2000.0));
+            assert!(
+                finger.contact(0).is_none() || way.any(|p| outside_m(&p) <= 2e-4),
+                "{name} {trial}: {from:?} -> {to:?}"
+            );
         }
         assert!(tried > 3000, "{name} {tried}");
     }

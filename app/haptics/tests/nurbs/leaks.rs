@@ -52,7 +52,7 @@ fn no_approach_leaks_at_any_scale() {
             let entities = [entity(nurbs.clone(), Friction::None)];
             let mut noise = Noise(7);
             let mut straight_in = 0;
-            for trial in 0..7000 {
+            for trial in 0..2500 {
                 let (point, normal) = place(&nurbs, &mut noise);
                 // Wherever it comes from, so far that it is outside for certain.
                 let from = point + noise.vector(1.0).normalize() * (3.0 * size);
@@ -72,7 +72,7 @@ fn no_approach_leaks_at_any_scale() {
                 // Held where it came in, not where it would have been found.
                 straight_in += u32::from(ticks == 1);
             }
-            assert!(straight_in > 1000, "{straight_in}");
+            assert!(straight_in > 350, "{straight_in}");
         }
     }
 }
@@ -130,7 +130,7 @@ fn random_walks_never_pop_through_and_never_stick() {
             let (mut finger, mut noise) = (point_finger(), Noise(seed));
             let (mut hip, mut drift) = (Vector3::new(0.0, 0.2, 0.0), Vector3::zeros());
             let (mut held, mut was_outside) = (0, true);
-            for i in 0..20_000 {
+            for i in 0..8000 {
                 if i % 200 == 0 {
                     // Towards some place of the surface or beyond it.
                     let (point, normal) = place(&nurbs, &mut noise);
@@ -158,7 +158,7 @@ fn random_walks_never_pop_through_and_never_stick() {
             // Pulled away it is free.
             let out = finger.step(&entities, &Vector3::new(0.3, 0.4, 0.5), DT);
             assert!(out.entity.is_none(), "{name}");
-            assert!((1000..19_000).contains(&held), "{name} {seed} {held}");
+            assert!((400..7600).contains(&held), "{name} {seed} {held}");
         }
     }
 }

@@ -37,7 +37,7 @@ fn a_slide_over_edges_ends_at_rest_within_its_bound_and_in_its_cone() {
         for law in laws() {
             let mut noise = Noise(21);
             let mut crossed = 0;
-            for _ in 0..5000 {
+            for _ in 0..2000 {
                 let start = solid.form.nearest(&solid.point(noise.uniform(), noise.uniform()));
                 let hip = inside(&solid, &mut noise);
                 let mut cone = FrictionCone::new(start);
@@ -69,7 +69,7 @@ fn a_slide_over_edges_ends_at_rest_within_its_bound_and_in_its_cone() {
                 assert!(tangential <= mu * normal + 1e-13, "{} {law:?} {tangential} {normal}", solid.name);
             }
             let has_slanted_edges = solid.name.contains("cone");
-            assert!(crossed > 5 || !has_slanted_edges || law != Friction::None, "{}: {crossed}", solid.name);
+            assert!(crossed > 2 || !has_slanted_edges || law != Friction::None, "{}: {crossed}", solid.name);
         }
     }
 }

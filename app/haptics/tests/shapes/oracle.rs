@@ -33,7 +33,7 @@ fn a_path_enters_where_samples_of_it_first_meet_the_material() {
     for solid in solids::all() {
         let mut noise = Noise(12);
         let (mut entered, mut through) = (0, 0);
-        for i in 0..1500 {
+        for i in 0..500 {
             let from = anywhere(&mut noise, solid.size_m);
             // A third of them as short as ticks.
             let to = if i % 3 == 0 {
@@ -70,7 +70,7 @@ fn a_path_enters_where_samples_of_it_first_meet_the_material() {
             let off = (at.point_B - crossing).norm();
             assert!(off <= tolerance, "{}: off by {off}, slope {slope}", solid.name);
         }
-        assert!(entered > 120 && through > 40, "{}: {entered} {through}", solid.name);
+        assert!(entered > 40 && through > 12, "{}: {entered} {through}", solid.name);
     }
 }
 

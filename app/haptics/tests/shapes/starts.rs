@@ -18,12 +18,19 @@ fn begin_all_over(distance: Distance<'_>, entity: &Entity, radius_m: f64, starts
     let slack_m = if entity.for_balls.is_some() { IN_TRIANGLES_M } else { 1e-9 };
     for start in 0..starts {
         let mut hip = Vector3::from_fn(|_, _| noise.between(-0.15, 0.15));
-        let overlap_m = (radius_m - distance(&hip)).max(0.0);
+        let start_at = hip;
+        // Looked for where a force has to be explained.
+        let mut overlap_m = None;
         let mut finger = finger(radius_m);
         let mut way_m = 0.0;
         for tick in 0..12 {
             let force_n = finger.step(from_ref(entity), &hip, DT).force_on_user_W.norm();
-            let most_n = K * (overlap_m + way_m + slack_m);
+            let explained_m = if force_n > K * (way_m + slack_m) {
+                *overlap_m.get_or_insert_with(|| (radius_m - distance(&start_at)).max(0.0))
+            } else {
+                0.0
+            };
+            let most_n = K * (explained_m + way_m + slack_m);
             assert!(
                 force_n <= most_n * (1.0 + 1e-9),
                 "{:?}, {:?}, {radius_m} m, start {start}, tick {tick} at {hip:?}: {force_n} N, explained {most_n} N",

@@ -165,7 +165,8 @@ impl<F: Fn(f64) -> f64 + 'static> Curve<F> {
                 (inner, outer) = ((inner - STEP_M_S).max(0.0), inner);
             }
         }
-        for _ in 0..50 {
+        // To less than a rounding of speeds of a metre per second.
+        for _ in 0..36 {
             let middle = 0.5 * (inner + outer);
             if is_pulled(middle) { inner = middle } else { outer = middle }
         }
