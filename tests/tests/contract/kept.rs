@@ -1,11 +1,10 @@
 //! Results that two processes, a signal, a full disk or a reader who does not read must not cost.
 
+use crate::abandoned::unread_pipe;
 use patience::prelude::*;
 use rustix::process::{Pid, Signal, kill_process};
-use std::fs::File;
 use std::path::Path;
 use std::process::{Command, Stdio};
-use std::time::{Duration, Instant};
 use system_tests::recording::Table;
 use system_tests::workplace::{Running, Said, Workplace};
 
@@ -26,21 +25,6 @@ fn workplace(seconds: &str) -> Workplace {
 
 fn signal(running: &Running, signal: Signal) {
     kill_process(Pid::from_child(&running.child), signal).expect("our child");
-}
-
-/// A pipe with a reader who never reads, and no room.
-fn full_pipe(path: &Path) -> File {
-    let pipe = unread_pipe(path);
-    while rustix::io::write(&pipe, &[0; 4096]).is_ok() {}
-    pipe
-}
-
-/// A pipe with a reader who never reads.
-fn unread_pipe(path: &Path) -> File {
-    let mode = rustix::fs::Mode::RUSR | rustix::fs::Mode::WUSR;
-    rustix::fs::mknodat(rustix::fs::CWD, path, rustix::fs::FileType::Fifo, mode, 0).expect("a pipe");
-    let flags = rustix::fs::OFlags::RDWR | rustix::fs::OFlags::NONBLOCK;
-    rustix::fs::open(path, flags, rustix::fs::Mode::empty()).expect("our own pipe").into()
 }
 
 fn hidden(place: &Workplace) -> Vec<String> {
@@ -272,31 +256,6 @@ fn events_that_did_not_reach_their_file_are_not_counted() {
         place.run(["run", "scene.toml", "--clock", "virtual", "--seconds", "3", "--events", "/dev/full"]);
     assert_eq!(said.status, Some(3), "{}", said.err);
     assert!(said.err.contains("it is complete up to t = 0 s (0 rows)"), "{}", said.err);
-}
-
-#[test]
-fn a_run_whose_pipe_is_full_from_the_start_begins_and_ends_with_words() {
-    let place = workplace("0");
-    let started = ["out.csv", "out.mcap", "events.csv"].map(|name| {
-        let pipe = full_pipe(&place.path(name));
-        let option = if name.starts_with("events") { "--events" } else { "--record" };
-        let mut program = place.phantom3();
-        program.args(["run", "scene.toml", "--headless", "--seconds", "40000", option, name]);
-        (Running::start(program), pipe)
-    });
-    // Each has begun when it answers a signal; before, it would end at once.
-    std::thread::sleep(Duration::from_secs(5));
-    let begun = Instant::now();
-    for (running, _) in &started {
-        signal(running, Signal::TERM);
-    }
-    for (running, _pipe) in started {
-        let said = running.wait();
-        assert_eq!(said.status, Some(3), "{}", said.err);
-        assert!(said.err.contains("nothing was written for 30 s"), "{}", said.err);
-    }
-    assert!(begun.elapsed() < Duration::from_secs(120), "30 s are waited for: {:?}", begun.elapsed());
-    assert_eq!(place.processes(), Vec::<u32>::new());
 }
 
 #[test]

@@ -1,5 +1,6 @@
 //! The program as scripts drive it: what a run prints, writes, refuses and feels like, scene by scene.
 
+mod abandoned;
 mod bad_input;
 mod ball;
 mod crowd;

@@ -228,49 +228,6 @@ fn a_table_on_the_standard_output_is_that_of_the_file_and_the_report_goes_to_sta
     assert!(said.err.contains("recording    the standard output (0 events)"), "{}", said.err);
 }
 
-/// A full pipe makes the run wait for its recording.
-fn check_that_a_signal_ends_a_run_that_nobody_reads(output: &str) {
-    let place = workplace();
-    let mode = rustix::fs::Mode::RUSR | rustix::fs::Mode::WUSR;
-    let kind = rustix::fs::FileType::Fifo;
-    rustix::fs::mknodat(rustix::fs::CWD, place.path("out.csv"), kind, mode, 0).expect("a pipe");
-    // Both ends: the program finds a reader, who never reads.
-    let pipe = std::fs::OpenOptions::new().read(true).write(true).open(place.path("out.csv"));
-    let pipe = pipe.expect("our own pipe");
-    let said = std::fs::File::create(place.path("said")).expect("a file");
-    let mut program = place.phantom3();
-    program.args(["run", "scene.toml", "--clock", "virtual", "--seconds", "40000", "--record", output]);
-    program.stdout(Stdio::null()).stderr(said);
-    if output == "-" {
-        program.stdout(pipe.try_clone().expect("the same pipe"));
-    }
-    let mut child = program.spawn().expect("it starts");
-    let waiting = || rustix::io::ioctl_fionread(&pipe).expect("our own pipe");
-    patience::until("a pipe that takes no more", || {
-        let before = waiting();
-        std::thread::sleep(std::time::Duration::from_millis(500));
-        before > 4096 && waiting() == before
-    });
-    let pid = rustix::process::Pid::from_child(&child);
-    rustix::process::kill_process(pid, rustix::process::Signal::TERM).expect("our own child");
-    // The recorder has 30 s to get on.
-    let status = child.wait_within(std::time::Duration::from_secs(120)).code();
-    let said = std::fs::read_to_string(place.path("said")).expect("words");
-    assert_eq!(status, Some(3), "{output}: {said}");
-    assert!(said.contains("nothing was written for 30 s"), "{output}: {said}");
-    assert_eq!(place.processes(), Vec::<u32>::new());
-}
-
-#[test]
-fn a_signal_ends_a_run_whose_recording_nobody_reads() {
-    check_that_a_signal_ends_a_run_that_nobody_reads("out.csv");
-}
-
-#[test]
-fn a_signal_ends_a_run_whose_standard_output_nobody_reads() {
-    check_that_a_signal_ends_a_run_that_nobody_reads("-");
-}
-
 #[test]
 fn a_reader_who_has_seen_enough_ends_the_run_quietly_where_nothing_else_is_recorded() {
     let script = "{ \"$0\" \"$@\"; echo \"status $?\" >&2; } | head -n 2";

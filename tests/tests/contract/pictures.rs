@@ -21,7 +21,7 @@ field_of_view_deg = 40.0
 ";
 
 /// The run's own words where pictures cannot be had here.
-fn are_missing(said: &Said) -> bool {
+pub(crate) fn are_missing(said: &Said) -> bool {
     let missing = said.err.lines().find(|line| line.contains("no pictures: "));
     if let Some(missing) = missing {
         println!("skipped: {missing}");
@@ -234,26 +234,6 @@ look_at_m = [0.0, 0.0, 0.0]
 field_of_view_deg = 35.0
 ";
 const HAND: &str = "t,f0_x,f0_y,f0_z\n0,0,0.05,0\n0.2,0,-0.02,0\n0.3,0.004,-0.02,0\n1,0.004,-0.02,0\n";
-
-#[test]
-fn a_run_whose_picture_nobody_reads_ends_with_words() {
-    let place = place();
-    let name = place.path("a.png");
-    let mode = rustix::fs::Mode::RUSR | rustix::fs::Mode::WUSR;
-    rustix::fs::mknodat(rustix::fs::CWD, &name, rustix::fs::FileType::Fifo, mode, 0).expect("a pipe");
-    // Both ends: the program finds a reader, who never reads, and no room.
-    let flags = rustix::fs::OFlags::RDWR | rustix::fs::OFlags::NONBLOCK;
-    let pipe = rustix::fs::open(&name, flags, rustix::fs::Mode::empty()).expect("our own pipe");
-    while rustix::io::write(&pipe, &[0; 4096]).is_ok() {}
-    let run = ["run", "scene.toml", "--clock", "virtual", "--seconds", "1", "--headless"];
-    let film = ["--snapshot", "0.01:a.png", "--frames", "film", "--picture-size", "32x32"];
-    let said = place.run(run.into_iter().chain(film));
-    if are_missing(&said) {
-        return;
-    }
-    assert_eq!(said.status, Some(3), "{said:?}");
-    assert!(said.err.contains("no picture was written for 30 s"), "{said:?}");
-}
 
 #[test]
 fn a_runs_picture_has_the_friction_circle_and_the_normal_where_the_finger_presses() {
