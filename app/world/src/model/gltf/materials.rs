@@ -26,6 +26,9 @@ pub(super) struct Materials {
 /// Of all pictures of a file together: half a gigabyte.
 const MOST_TEXELS: usize = 1 << 27;
 
+/// An image and what lies beyond its edges, and the texture, if it could be read.
+type Known = (usize, [Wrap; 2], Option<Arc<Texture>>);
+
 /// Which texture coordinates, and what is done to them.
 #[derive(Clone, Copy)]
 pub(super) struct Lie {
@@ -104,7 +107,7 @@ impl Materials {
     pub(super) fn read(document: &Document, buffers: &mut Buffers<'_>) -> Self {
         let mut read =
             Self { finishes: Vec::new(), lies: Vec::new(), unread: Vec::new(), texels_left: MOST_TEXELS };
-        let mut images: Vec<(usize, [Wrap; 2], Option<Arc<Texture>>)> = Vec::new();
+        let mut images = Vec::new();
         for material in &document.materials {
             let pbr = Pbr::deserialize(&material.pbr_metallic_roughness).unwrap_or_default();
             let info = pbr.base_color_texture.as_ref();
@@ -131,7 +134,7 @@ impl Materials {
         index: usize,
         document: &Document,
         buffers: &mut Buffers<'_>,
-        images: &mut Vec<(usize, [Wrap; 2], Option<Arc<Texture>>)>,
+        images: &mut Vec<Known>,
     ) -> Option<Arc<Texture>> {
         let of: TextureOf = element(&document.textures, index);
         let source = of.source?;
