@@ -60,7 +60,7 @@ pub enum RunFailure {
     /// The driver that somebody runs is in its fault state.
     #[error(
         "the driver is in its fault state: {why}; the motors are off; find the cause, then `io-driver clear-fault{place}` (or \
-         `phantom3 driver clear-fault ...`), and start a new run"
+         `phantom3 driver clear-fault{place}`), and start a new run"
     )]
     RunningDriverFault {
         /// The fault.

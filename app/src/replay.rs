@@ -290,7 +290,8 @@ impl Play {
         let mut feed = lock(&feed);
         let failure: Result<(), ReadError> = feed.failure.take().map_or(Ok(()), Err);
         let until_s = run_time_s(self.fast.run_ticks().saturating_sub(1).cast_signed(), period_ns);
-        tell_end(&args.recording, failure, feed.recorded.cut(), rows_read, until_s)?;
+        let whole = tell_end(&args.recording, failure, feed.recorded.cut(), rows_read, until_s);
+        let whole = if rows_read == 0 { whole.map(|()| Ok(()))? } else { whole };
         let stop = ended?;
         if let Stop::Signal(_) = stop {
             difference.end_before(feed.count_with(rows_read));
@@ -310,6 +311,8 @@ impl Play {
             tell(&format_args!("written      {} ({} rows)", Plain(place.display()), recorded.rows));
         }
         tell(&difference);
+        // What is whole before the damage was told.
+        whole?;
         // The recorder has told why.
         if recordings.iter().any(|recorded| recorded.failure.is_some()) {
             return Ok(ExitCode::from(3));

@@ -38,7 +38,7 @@ use io_driver::open::{HandFiles, open_devices_with};
 use nalgebra::{Isometry3, Vector3};
 use physics::{Aabb, Body, BroadPhase};
 use shm_abi::segment::ClockMode;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use world::{FacesSpec, FrictionSpec, Layout, Scene, SceneEntity, SceneFinger, Settings, ShapeSpec};
@@ -67,6 +67,8 @@ pub struct Rig {
     pictures: Pictures,
     /// The files of both, before they were read.
     versions: BTreeMap<PathBuf, FileVersion>,
+    /// Of models that consist of several files, the others, by their paths from the model's directory.
+    beside: BTreeMap<PathBuf, Vec<PathBuf>>,
 }
 
 /// How the hand moves the devices that are not real.
@@ -132,9 +134,13 @@ impl Rig {
         let hand = named.map(|(path, named_by)| check_hand(path, &named_by, &scene)).transpose();
         let hand = problems.keep(hand);
         let version = |file: &PathBuf| Some((file.clone(), FileVersion::of(file)?));
+        let beside = beside(&scene);
+        let parts = beside.iter().flat_map(|(model, names)| files_beside(model, names));
+        let versions = model_files(&scene).cloned().chain(parts).filter_map(|file| version(&file)).collect();
         let mut rig = Self {
             scene_file: scene_file.into(),
-            versions: model_files(&scene).filter_map(version).collect(),
+            versions,
+            beside,
             models: Models::load(&scene, problems),
             pictures: Pictures::load(&scene, problems),
             scene,
@@ -287,7 +293,12 @@ impl Rig {
         model_files(&self.scene)
     }
 
-    /// True for such a file that is not what was read of it any more.
+    /// The files that such a file consists of beside itself, by their paths from its directory.
+    pub fn names_beside(&self, model_file: &Path) -> &[PathBuf] {
+        self.beside.get(model_file).map_or(&[], Vec::as_slice)
+    }
+
+    /// True for a file of a model that is not what was read of it any more.
     pub fn has_changed(&self, model_file: &Path) -> bool {
         self.versions.get(model_file).copied() != FileVersion::of(model_file)
     }
@@ -300,7 +311,8 @@ impl Rig {
         };
         let hands = self.hand.iter().map(|hand| &hand.path).chain(&self.scene.hand);
         let scenes = [&self.scene_file].into_iter().chain(&self.scene.included);
-        scenes.chain(hands).chain(devices).chain(self.model_files()).cloned().collect()
+        let named = scenes.chain(hands).chain(devices).chain(all_model_files(&self.scene)).cloned();
+        named.chain(self.beside.iter().flat_map(|(model, names)| files_beside(model, names))).collect()
     }
 
     fn refused(&self, line: Option<usize>, what: String, source: ParameterError) -> RigError {
@@ -328,6 +340,28 @@ fn model_files(scene: &Scene) -> impl Iterator<Item = &PathBuf> {
         _ => None,
     });
     models.chain(scene.entities.iter().filter_map(|entity| Some(&entity.height_map.as_ref()?.file)))
+}
+
+/// Those that are felt, and those that are only seen.
+fn all_model_files(scene: &Scene) -> impl Iterator<Item = &PathBuf> {
+    let visuals = scene.entities.iter().flat_map(|entity| &entity.visuals);
+    let seen = visuals.filter_map(|visual| match &visual.shape {
+        Some(ShapeSpec::Mesh(model) | ShapeSpec::Nurbs(model)) => Some(&model.file),
+        _ => None,
+    });
+    model_files(scene).chain(seen)
+}
+
+/// Of each model that consists of several files, the others.
+fn beside(scene: &Scene) -> BTreeMap<PathBuf, Vec<PathBuf>> {
+    let files: BTreeSet<&PathBuf> = all_model_files(scene).collect();
+    let named = files.into_iter().map(|file| (file.clone(), world::model::files_beside(file)));
+    named.filter(|(_, names)| !names.is_empty()).collect()
+}
+
+fn files_beside<'m>(model: &'m Path, names: &'m [PathBuf]) -> impl Iterator<Item = PathBuf> + 'm {
+    let directory = model.parent().unwrap_or(Path::new(""));
+    names.iter().map(move |name| directory.join(name))
 }
 
 /// The friction that this says.

@@ -160,7 +160,7 @@ impl Parts {
                 let carries_devices = rig.goes_with_the_camera();
                 let shown = shown();
                 for line in &shown.stage.not_drawn {
-                    say(format_args!("phantom3: not in the window: {line}"));
+                    say(format_args!("phantom3: not in the window as it should be: {line}"));
                 }
                 open_window(&WindowSpec { carries_devices, ..spec.clone() }, shown, reins)?
             }

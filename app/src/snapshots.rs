@@ -307,7 +307,7 @@ impl Drawer {
     /// Or what is missing.
     fn new(stage: &Stage, wanted: &Wanted) -> Result<Self, String> {
         for line in &stage.not_drawn {
-            say(format_args!("phantom3: not in pictures: {line}"));
+            say(format_args!("phantom3: not in pictures as it should be: {line}"));
         }
         let camera = camera_of(stage, wanted.camera.as_deref()).or_else(|_| camera_of(stage, None));
         let studio = Studio::new(stage, wanted.size).map_err(|missing| missing.to_string())?;

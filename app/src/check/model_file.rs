@@ -73,6 +73,8 @@ struct Understood {
     origins: Vec<usize>,
     /// Names of its faces, if the format has any.
     names: Option<FaceNames>,
+    /// What cannot be read of how it looks.
+    unread: Vec<String>,
     low: Vector3<f64>,
     high: Vector3<f64>,
     /// Area of its surface and volume of the space in it.
@@ -101,6 +103,8 @@ fn read(args: &CheckArgs) -> Result<Understood, String> {
     let bytes = model::read_file(&args.scene).map_err(told)?;
     let soup = model::read(&args.scene, &bytes).map_err(told)?;
     let names = model::read_names(&args.scene, &bytes).map_err(told)?;
+    let looks = model::read_appearance(&args.scene, &bytes);
+    let unread = looks.map_or_else(|error| vec![error.to_string()], |looks| looks.unwrap_or_default().unread);
     drop(bytes);
     let holes = args.close_holes.map_or(CloseHoles::Small, CloseHoles::UpTo);
     let (mut is_lid, mut origins) = (Vec::new(), Vec::new());
@@ -119,7 +123,7 @@ fn read(args: &CheckArgs) -> Result<Understood, String> {
         area += 0.5 * (b - a).cross(&(c - a)).norm();
         volume += a.dot(&b.cross(&c)) / 6.0;
     }
-    Ok(Understood { mesh, report, is_lid, origins, names, low, high, area, volume })
+    Ok(Understood { mesh, report, is_lid, origins, names, unread, low, high, area, volume })
 }
 
 impl Understood {
@@ -161,7 +165,7 @@ impl Understood {
             row("written", &format!("{}: {}", out.display(), self.written()));
         }
         let file = args.scene.display();
-        if let Some(advice) = self.suspicion() {
+        for advice in self.warnings() {
             let _ = writeln!(text, "warning: {advice}");
         }
         let _ = writeln!(text, "{file}: can be felt");
@@ -205,6 +209,11 @@ impl Understood {
         }
     }
 
+    fn warnings(&self) -> impl Iterator<Item = String> {
+        let unread = self.unread.iter().map(|said| format!("{said}; it is for the window only"));
+        self.suspicion().into_iter().chain(unread)
+    }
+
     fn suspicion(&self) -> Option<String> {
         let size = (self.high - self.low).amax();
         let (unit, scale) = match size {
@@ -243,7 +252,7 @@ fn to_json(
         "ok": written.is_ok(),
         "file": file,
         "problems": written.as_ref().err().map(|problem| json!({ "message": problem })).into_iter().collect::<Vec<_>>(),
-        "warnings": understood.suspicion().into_iter().collect::<Vec<_>>(),
+        "warnings": understood.warnings().collect::<Vec<_>>(),
         "mesh": {
             "triangles": report.faces, "vertices": report.vertices, "parts": report.components,
             "is_clean": report.is_clean(), "report": report.to_string(),

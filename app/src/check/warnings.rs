@@ -270,7 +270,11 @@ fn unseen(whole: &Scene) -> Vec<String> {
         let error = model::load(file).err()?;
         Some(format!("{at}: {}: {error}; it is for the window only", file.display()))
     };
-    files.into_iter().filter_map(wrong).collect()
+    let unread: Vec<String> = files.into_iter().filter_map(wrong).collect();
+    // Of those that are felt, too.
+    let plain = whole.seen().plain.into_iter();
+    let plain = plain.map(|(at, error)| format!("{at}: {error}; it is for the window only"));
+    unread.into_iter().chain(plain).collect()
 }
 
 /// A tenth of a millimetre is what rounding in a file leaves.

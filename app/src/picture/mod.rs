@@ -66,6 +66,7 @@ pub fn execute(args: &PlotArgs) -> Result<Stop, RunFailure> {
     };
     let out = args.stem();
     if !args.by_entity {
+        args.check_name()?;
         check_place(&out)?;
     }
     let inputs: Vec<&PathBuf> = [&args.recording].into_iter().chain(&args.against).collect();
@@ -139,7 +140,26 @@ impl PlotArgs {
         let is_picture = |ending: &OsStr| ending == "svg" || ending == "png";
         if out.extension().is_some_and(is_picture) { out.with_extension("") } else { out.clone() }
     }
+
+    /// Two files are written, SVG and PNG.
+    fn check_name(&self) -> Result<(), RunFailure> {
+        let Some(out) = &self.out else { return Ok(()) };
+        let ending = out.extension().unwrap_or_default();
+        let wrong = if out.as_os_str() == "-" {
+            "the standard output, which takes one file".to_owned()
+        } else if OTHER_KINDS.iter().any(|kind| ending.eq_ignore_ascii_case(kind)) {
+            format!("{}, a kind of picture that is not drawn", Plain(out.display()))
+        } else {
+            return Ok(());
+        };
+        Err(RunFailure::Start(format!(
+            "--out: found {wrong}; allowed: a name without ending, to which .svg and .png are added"
+        )))
+    }
 }
+
+/// Kinds of pictures that are not drawn.
+const OTHER_KINDS: [&str; 7] = ["pdf", "jpg", "jpeg", "eps", "ps", "gif", "webp"];
 
 /// `pictures/`, `.` and `..`
 fn is_directory_name(path: &Path) -> bool {

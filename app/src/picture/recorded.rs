@@ -314,7 +314,7 @@ mod tests {
             ("t;a_hip_x\n0,5;1,2\n", "it has semicolons"),
             (&*format!("{HEADER}0.1,1,2,3,four,5,6,,\n"), "r.csv:2: a_force_x is \"four\""),
             (&*format!("{HEADER}0,1,2\n"), "r.csv:2: found 3 cells, expected 9"),
-            (&*format!("{HEADER}\n"), "r.csv:2: found 1 cells, expected 9"),
+            (&*format!("{HEADER}\n0,1,2,3,4,5,6,,\n"), "r.csv:2: found an empty line"),
             (&*format!("{HEADER}\"0\",1,2,3,4,5,6,,\n"), "r.csv:2: t is \"\\\"0\\\"\"; allowed: a number"),
         ] {
             let error = read(text).expect_err("refused").to_string();

@@ -26,6 +26,9 @@ const ORDERED_BEFORE: &str = "ordered_before";
 /// Facts that begin so say why a file is not here.
 const LEFT_OUT: &str = "left out: ";
 
+/// Names of files begin so that a model consists of beside itself.
+const BESIDE: &str = "beside:";
+
 /// More than this of models and pictures is not put into a recording.
 const MOST_MODEL_BYTES: u64 = 64 << 20;
 /// More than this a recording's files never have: scene, hand, and the others.
@@ -34,10 +37,18 @@ pub(super) const MOST_FILE_BYTES: u64 = 2 * MAX_TABLE_BYTES + MOST_MODEL_BYTES;
 /// A file that the run read.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct InputFile {
-    /// What it is to the run: `scene`, `hand`, `layout` or `model`; then `:` and its path.
+    /// What it is to the run: `scene`, `hand`, `layout` or `model`; then `:` and its path. A file that a model consists of
+    /// beside itself is `beside`, its path is a list in JSON: that of the model, and its own from the model's directory.
     pub name: String,
     /// Its content.
     pub bytes: Vec<u8>,
+}
+
+impl InputFile {
+    /// Whether it is a model or a picture, or a part of one.
+    pub fn is_of_a_model(&self) -> bool {
+        ["model:", BESIDE].iter().any(|what| self.name.starts_with(what))
+    }
 }
 
 /// Where in a run a recording begins that was asked for while it went on.
@@ -152,20 +163,37 @@ impl About {
         models.sort_unstable();
         models.dedup();
         for model in models {
-            let length = model.metadata().map_or(0, |file| file.len());
-            let Some(rest) = left.checked_sub(length) else {
-                self.leave_out(model, format!("{length} bytes"));
-                continue;
-            };
-            left = rest;
-            match input_file::read(model, MAX_TABLE_BYTES) {
-                Err(error) => self.leave_out(model, format!("it cannot be read any more: {error}")),
-                Ok(_) if rig.has_changed(model) => {
-                    self.leave_out(model, "it has changed since the run read it".into());
-                }
-                Ok(bytes) => self.files.push(InputFile { name: format!("model:{}", model.display()), bytes }),
+            self.attach_model(rig, model, format!("model:{}", model.display()), &mut left);
+            let directory = model.parent().unwrap_or(Path::new(""));
+            for beside in rig.names_beside(model) {
+                let path = json!([model.display().to_string(), beside.display().to_string()]);
+                self.attach_model(rig, &directory.join(beside), format!("{BESIDE}{path}"), &mut left);
             }
         }
+    }
+
+    fn attach_model(&mut self, rig: &Rig, file: &Path, name: String, left: &mut u64) {
+        let length = file.metadata().map_or(0, |file| file.len());
+        let Some(rest) = left.checked_sub(length) else {
+            return self.leave_out(file, format!("{length} bytes"));
+        };
+        *left = rest;
+        match input_file::read(file, MAX_TABLE_BYTES) {
+            Err(error) => self.leave_out(file, format!("it cannot be read any more: {error}")),
+            Ok(_) if rig.has_changed(file) => {
+                self.leave_out(file, "it has changed since the run read it".into());
+            }
+            Ok(bytes) => self.files.push(InputFile { name, bytes }),
+        }
+    }
+
+    /// The files that a model consists of beside itself, each with its path from the model's directory.
+    pub fn beside<'a>(&'a self, model: &'a str) -> impl Iterator<Item = (PathBuf, &'a [u8])> {
+        self.files.iter().filter_map(move |file| {
+            let path = file.name.strip_prefix(BESIDE)?;
+            let [of, beside]: [String; 2] = serde_json::from_str(path).ok()?;
+            (of == model).then_some((beside.into(), &file.bytes[..]))
+        })
     }
 
     fn leave_out(&mut self, file: &Path, why: String) {

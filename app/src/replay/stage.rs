@@ -8,7 +8,7 @@ use crate::rig::{HandMode, Rig};
 use crate::settings;
 use rt_core::input_file;
 use shm_abi::segment::ClockMode;
-use std::path::{Path, PathBuf};
+use std::path::{Component, Path, PathBuf};
 use tempfile::TempDir;
 use toml_edit::DocumentMut;
 use world::{MAX_FILE_BYTES, Scene, Settings, ShapeSpec};
@@ -123,11 +123,22 @@ fn unpack_models(scene: &mut Scene, about: &About) -> Result<Option<TempDir>, Ru
     let directory = tempfile::Builder::new().prefix("phantom3-replay-").tempdir().map_err(no_room)?;
     for (index, (path, file)) in models.iter().enumerate() {
         // Only the name's end is taken, for the format that it says: a recording says nothing of where to write.
-        let mut place = directory.path().join(format!("model-{index}"));
+        let own = directory.path().join(format!("model-{index}"));
+        std::fs::create_dir(&own).map_err(no_room)?;
+        let mut place = own.join("model");
         if let Some(ending) = path.extension() {
             place.set_extension(ending);
         }
         std::fs::write(&place, &file.bytes).map_err(no_room)?;
+        for (beside, bytes) in about.beside(&path.to_string_lossy()) {
+            // Below its own directory, and not in place of the model.
+            let is_below = beside.components().all(|part| matches!(part, Component::Normal(_)));
+            let to = own.join(&beside);
+            if is_below && !to.exists() {
+                std::fs::create_dir_all(to.parent().unwrap_or(&own)).map_err(no_room)?;
+                std::fs::write(&to, bytes).map_err(no_room)?;
+            }
+        }
         // Where settings said where it is, the scene has no more than its name.
         let is_known = |named: &Path| models.iter().any(|(path, _)| *path == named);
         for named in model_files(scene) {
@@ -156,7 +167,7 @@ fn about(rig: &Rig, recorded: &RecordedRun, is_own: bool, text: String) -> About
         Some(of_recording) if is_own => of_recording.files.clone(),
         _ => std::mem::take(&mut about.files),
     };
-    about.files = models.into_iter().filter(|file| file.name.starts_with("model:")).collect();
+    about.files = models.into_iter().filter(InputFile::is_of_a_model).collect();
     let name = format!("scene:{}", rig.scene_file.display());
     about.files.insert(0, InputFile { name, bytes: text.into_bytes() });
     about

@@ -41,7 +41,7 @@ impl Crowd {
         let (mut alike, mut clear) = (Vec::<Alike>::new(), Vec::new());
         let mut textures = Textures { context, made: Vec::new() };
         for thing in things {
-            if thing.colour[3] < 1.0 {
+            if thing.is_clear() {
                 clear.push(Clear::new(context, thing, textures.of(thing)));
                 continue;
             }
@@ -133,7 +133,10 @@ impl Alike {
             casts_shadow: first.casts_shadow,
             things: vec![first.clone()],
             shown,
-            model: Gm::new(mesh, PhysicalMaterial { albedo_texture: texture, ..material(context, [1.0; 4]) }),
+            model: Gm::new(
+                mesh,
+                PhysicalMaterial { albedo_texture: texture, ..material(context, [1.0; 4], false) },
+            ),
         }
     }
 
@@ -156,8 +159,10 @@ impl Alike {
 impl Clear {
     fn new(context: &Context, thing: &Thing, texture: Option<Texture2DRef>) -> Self {
         let mesh = Mesh::new(context, &mesh_of(&thing.triangles));
-        let model =
-            Gm::new(mesh, PhysicalMaterial { albedo_texture: texture, ..material(context, thing.colour) });
+        let model = Gm::new(
+            mesh,
+            PhysicalMaterial { albedo_texture: texture, ..material(context, thing.colour, true) },
+        );
         Self { thing: thing.clone(), is_seen: false, at: Mat4::from_scale(0.0), model }
     }
 

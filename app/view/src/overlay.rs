@@ -98,7 +98,8 @@ impl Model {
     fn new(context: &Context, shape: &ShapeSpec, colour: [f64; 4]) -> Self {
         // A closed form has its picture.
         let triangles = shapes::triangles(shape, None).unwrap_or_default();
-        let drawn = Gm::new(Mesh::new(context, &mesh_of(&triangles)), material(context, colour));
+        let drawn =
+            Gm::new(Mesh::new(context, &mesh_of(&triangles)), material(context, colour, colour[3] < 1.0));
         let opacity = drawn.material.albedo.a;
         Self { drawn, is_seen: false, opacity }
     }

@@ -240,9 +240,9 @@ pub(crate) fn bytes(colour: [f64; 4]) -> Srgba {
     colour.map(|share| (255.0 * share).round() as u8).into()
 }
 
-pub(crate) fn material(context: &Context, colour: [f64; 4]) -> PhysicalMaterial {
+pub(crate) fn material(context: &Context, colour: [f64; 4], is_clear: bool) -> PhysicalMaterial {
     let made = CpuMaterial { albedo: bytes(colour), roughness: 0.7, metallic: 0.0, ..CpuMaterial::default() };
-    if colour[3] < 1.0 {
+    if is_clear {
         PhysicalMaterial::new_transparent(context, &made)
     } else {
         PhysicalMaterial::new_opaque(context, &made)

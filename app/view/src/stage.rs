@@ -73,6 +73,13 @@ pub struct Thing {
     pub space: u32,
 }
 
+impl Thing {
+    /// Whether light goes through it, somewhere at least.
+    pub(crate) fn is_clear(&self) -> bool {
+        self.colour[3] < 1.0 || self.texture.as_ref().is_some_and(|texture| texture.is_clear)
+    }
+}
+
 /// What is left of the opacity of walls behind a door, so that eyes outside see in.
 const WALL_OPACITY: f64 = 0.25;
 

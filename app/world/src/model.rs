@@ -50,7 +50,7 @@ use haptics::NurbsPatch;
 use haptics::mesh::{CornerUv, TriangleSoup};
 use rt_core::{input_file, separators};
 use std::io;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 /// The most a model file may have: a binary STL of twenty million triangles. The bound is there so that naming the
 /// wrong file ends in a message.
@@ -266,6 +266,19 @@ pub fn read_names(file: &Path, bytes: &[u8]) -> Result<Option<FaceNames>, ModelE
 /// Whether a file of this name may say how its faces look.
 pub fn may_have_appearance(file: &Path) -> bool {
     Format::of(file, b"").is_none_or(|format| format == Format::Gltf)
+}
+
+/// The files that a model consists of beside itself (buffers and pictures of glTF), by their paths from its directory;
+/// none of a file that cannot be read.
+pub fn files_beside(file: &Path) -> Vec<PathBuf> {
+    if !may_have_appearance(file) {
+        return Vec::new();
+    }
+    let bytes = read_file(file).unwrap_or_default();
+    match format(file, &bytes) {
+        Ok(Format::Gltf) => gltf::names_beside(&bytes),
+        _ => Vec::new(),
+    }
 }
 
 /// How the faces that [`read`] reads look; `None`: the format has nothing on that, or nothing of it is read.

@@ -24,6 +24,7 @@ mod kept;
 mod lists;
 mod materials;
 mod mesh;
+mod model_of_many_files;
 mod noise;
 mod nurbs;
 mod objects;

@@ -1,7 +1,8 @@
 //! Lines of a table in text, the same for whoever reads one.
 //!
 //! Model: whole lines without their ends, of bounded length. A last line without its end is left out: half a number is a
-//! number. Windows line ends and a byte order mark, which editors and spreadsheets add, do not count.
+//! number. Windows line ends, a byte order mark, and empty lines behind the last row, which editors and spreadsheets add, do
+//! not count.
 
 use super::ReadError;
 use rt_core::{input_file, separators};
@@ -17,6 +18,8 @@ pub(crate) struct CsvLines {
     file: PathBuf,
     reader: BufReader<File>,
     is_first: bool,
+    /// Read already, to know whether the empty lines before it are the end.
+    next: Option<String>,
     /// How the table ends, if that is in the middle of a line.
     pub(crate) cut: Option<String>,
 }
@@ -25,7 +28,7 @@ impl CsvLines {
     /// Opens a regular file.
     pub(crate) fn open(file: &Path) -> Result<Self, ReadError> {
         let opened = input_file::open(file).map_err(|source| ReadError::Io { file: file.into(), source })?;
-        Ok(Self { file: file.into(), reader: BufReader::new(opened), is_first: true, cut: None })
+        Ok(Self { file: file.into(), reader: BufReader::new(opened), is_first: true, next: None, cut: None })
     }
 
     /// The first line, which there has to be.
@@ -35,6 +38,24 @@ impl CsvLines {
 
     /// A whole line without its end; `None` behind the last.
     pub(crate) fn next_line(&mut self) -> Result<Option<String>, ReadError> {
+        if let Some(next) = self.next.take() {
+            return Ok(Some(next));
+        }
+        let is_header = self.is_first;
+        let line = self.read_line()?;
+        if is_header || line.as_ref().is_none_or(|line| !line.is_empty()) {
+            return Ok(line);
+        }
+        while let Some(next) = self.read_line()? {
+            if !next.is_empty() {
+                self.next = Some(next);
+                return Ok(line);
+            }
+        }
+        Ok(None)
+    }
+
+    fn read_line(&mut self) -> Result<Option<String>, ReadError> {
         let mut bytes = Vec::new();
         let read = self.reader.by_ref().take(MOST_ROW_BYTES as u64).read_until(b'\n', &mut bytes);
         read.map_err(|source| ReadError::Io { file: self.file.clone(), source })?;

@@ -284,6 +284,9 @@ pub(crate) fn check_cells(line: &str, found: usize, expected: usize) -> Result<(
     if found == expected {
         return Ok(());
     }
+    if line.is_empty() {
+        return Err("found an empty line, with rows behind it".into());
+    }
     let hint = separators::hint_for_row(line, expected);
     Err(format!("found {found} cells, expected {expected}{hint}"))
 }

@@ -28,7 +28,7 @@ use document::{Document, Name, Node, Primitive};
 use haptics::mesh::{CornerUv, TriangleSoup};
 use materials::Materials;
 use nalgebra::{Matrix3, Matrix4, Quaternion, UnitQuaternion, Vector3};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 /// Vertices, indices and primitives that every file may have.
 const ALWAYS_ALLOWED: usize = 1 << 22;
@@ -49,21 +49,34 @@ pub(super) fn read_gltf_names(bytes: &[u8], beside: Option<&Path>) -> Result<Fac
     Ok(read(bytes, beside)?.1)
 }
 
+/// Files that a glTF names, by their paths from its directory: buffers, then pictures.
+pub(super) fn names_beside(bytes: &[u8]) -> Vec<PathBuf> {
+    let document = buffers::parts(bytes).and_then(|(text, _)| Document::parse(text));
+    let Ok(document) = document else { return Vec::new() };
+    let buffers = document.buffers.iter().filter_map(|buffer| buffer.uri.as_deref());
+    let images = document.images.as_array().into_iter().flatten();
+    let images = images.filter_map(|image| image.get("uri")?.as_str());
+    let uris = buffers.chain(images).filter(|uri| !uri.starts_with("data:"));
+    uris.filter_map(buffers::below).collect()
+}
+
 /// How the triangles look.
 ///
 /// # Errors
-/// As [`read_gltf`]; texture coordinates that are not as the format has them.
+/// As [`read_gltf`].
 pub(super) fn read_gltf_appearance(bytes: &[u8], beside: Option<&Path>) -> Result<Appearance, ModelError> {
     let (text, binary) = buffers::parts(bytes)?;
     let document = Document::parse(text)?;
     let mut buffers = Buffers::load(&document, binary, beside)?;
     let materials = Materials::read(&document, &mut buffers);
     let mut merged = Merged::new(&document, &buffers, bytes.len());
-    merged.dressing = Some(Dressing { materials: &materials, of_face: Vec::new(), uv: Vec::new() });
+    merged.dressing =
+        Some(Dressing { materials: &materials, of_face: Vec::new(), uv: Vec::new(), unread: Vec::new() });
     merged.add_nodes()?;
-    let Some(Dressing { of_face, uv, .. }) = merged.dressing else { return Ok(Appearance::default()) };
-    let Materials { finishes, unread, .. } = materials;
-    Ok(Appearance { finishes, of_face, uv, unread })
+    let Some(dressing) = merged.dressing else { return Ok(Appearance::default()) };
+    let Dressing { of_face, uv, unread, .. } = dressing;
+    let unread = materials.unread.into_iter().chain(unread).collect();
+    Ok(Appearance { finishes: materials.finishes, of_face, uv, unread })
 }
 
 fn read(bytes: &[u8], beside: Option<&Path>) -> Result<(TriangleSoup, FaceNames), ModelError> {
@@ -100,6 +113,8 @@ struct Dressing<'d> {
     materials: &'d Materials,
     of_face: Vec<u32>,
     uv: Vec<CornerUv>,
+    /// What is wrong with texture coordinates.
+    unread: Vec<String>,
 }
 
 impl<'d> Merged<'d> {
@@ -188,7 +203,7 @@ impl<'d> Merged<'d> {
         if linear(X_WN).determinant() < 0.0 {
             faces.iter_mut().for_each(|face| face.swap(1, 2));
         }
-        self.dress(primitive, &faces, place)?;
+        self.dress(primitive, &faces, place);
         // Others may use the other vertices of the same accessor.
         let mut places = vec![u32::MAX; positions.len()];
         for corner in faces.iter_mut().flatten() {
@@ -211,20 +226,32 @@ impl<'d> Merged<'d> {
 
 impl Merged<'_> {
     /// Notes how faces look, by their corners' numbers within the primitive.
-    fn dress(&mut self, primitive: &Primitive, faces: &[[u32; 3]], place: &str) -> Result<(), ModelError> {
-        let Some(dressing) = &mut self.dressing else { return Ok(()) };
+    fn dress(&mut self, primitive: &Primitive, faces: &[[u32; 3]], place: &str) {
+        let Some(dressing) = &mut self.dressing else { return };
         let (finish, lie) = dressing.materials.of(primitive.material);
         dressing.of_face.extend(faces.iter().map(|_| finish));
-        let sets = [&primitive.attributes.uv_0, &primitive.attributes.uv_1];
-        let index = lie.and_then(|lie| sets.get(lie.set)?.as_u64());
-        let (Some(lie), Some(index)) = (lie, index) else {
+        let Some(lie) = lie else {
             dressing.uv.extend(faces.iter().map(|_| CornerUv::default()));
-            return Ok(());
+            return;
         };
-        let uv = self.accessors.uv(usize::try_from(index).unwrap_or(usize::MAX), place)?;
+        let sets = [&primitive.attributes.uv_0, &primitive.attributes.uv_1];
+        let index = sets.get(lie.set).and_then(|set| set.as_u64());
+        let index = index.and_then(|index| usize::try_from(index).ok());
+        let uv = index.map_or_else(
+            || {
+                Err(format!(
+                    "{place}: found no texture coordinates of set {}, which its material names",
+                    lie.set
+                ))
+            },
+            |index| self.accessors.uv(index, place).map_err(|error| error.to_string()),
+        );
+        let uv = uv.unwrap_or_else(|said| {
+            dressing.unread.push(said);
+            Vec::new()
+        });
         let at = |corner: u32| uv.get(corner as usize).map_or([0.0; 2], |uv| lie.placed([uv.x, uv.y]));
         dressing.uv.extend(faces.iter().map(|face| face.map(at)));
-        Ok(())
     }
 }
 

@@ -21,6 +21,8 @@ pub struct Texture {
     pub texels: Vec<[u8; 4]>,
     /// What lies beyond its edges, along its rows and along its columns.
     pub wraps: [Wrap; 2],
+    /// Whether light goes through where it is not opaque.
+    pub is_clear: bool,
 }
 
 /// What lies beyond the edge of a picture.
@@ -42,6 +44,8 @@ impl std::fmt::Debug for Texture {
     }
 }
 
+/// What may be there.
+pub(super) const ALLOWED: &str = "a PNG or JPEG file of at most 67 million places, 16384 on a side";
 /// Columns, or rows, of a picture that is read at most.
 const MOST_SIDE: usize = 16_384;
 /// Places of a picture that is read at most: half a gigabyte while it is made smaller.
@@ -60,9 +64,8 @@ impl Texture {
         let read = match bytes {
             [0x89, b'P', b'N', b'G', ..] => read_png,
             [0xff, 0xd8, ..] => read_jpeg,
-            [b'R', b'I', b'F', b'F', ..] => return Err("a WebP file".into()),
-            [0xab, b'K', b'T', b'X', ..] => return Err("a KTX file".into()),
-            _ => return Err("a file of another kind".into()),
+            [] => return Err("nothing".into()),
+            _ => return Err(kind(bytes).into()),
         };
         let decoded = catch_unwind(AssertUnwindSafe(|| read(bytes)));
         let mut texture = decoded.unwrap_or_else(|_| Err("a damaged file".into()))?;
@@ -76,7 +79,27 @@ impl Texture {
         if texels.is_empty() || texels.len() != columns * rows {
             return Err("a damaged file".into());
         }
-        Ok(Self { size: [columns as u32, rows as u32], texels, wraps: [Wrap::default(); 2] })
+        let wraps = [Wrap::default(); 2];
+        Ok(Self { size: [columns as u32, rows as u32], texels, wraps, is_clear: false })
+    }
+
+    /// Lets light through: as much as its places say, or all and nothing where these are on either side of `cutoff`.
+    #[must_use]
+    pub(super) fn cleared(mut self, cutoff: Option<f64>) -> Self {
+        if let Some(cutoff) = cutoff {
+            for texel in &mut self.texels {
+                texel[3] = if f64::from(texel[3]) / 255.0 < cutoff { 0 } else { 255 };
+            }
+        }
+        self.is_clear = self.texels.iter().any(|texel| texel[3] < 255);
+        self
+    }
+
+    /// Lets no light through, whatever its places say.
+    #[must_use]
+    pub(super) fn opaque(mut self) -> Self {
+        self.texels.iter_mut().for_each(|texel| texel[3] = 255);
+        self
     }
 
     /// Half as large along each side of more than one place.
@@ -92,8 +115,23 @@ impl Texture {
             });
             std::array::from_fn(|k| (from.iter().map(|texel| u16::from(texel[k])).sum::<u16>() / 4) as u8)
         });
-        Self { size, texels: texels.collect(), wraps: self.wraps }
+        Self { size, texels: texels.collect(), ..*self }
     }
+}
+
+/// What a file is that is no picture that can be read.
+fn kind(bytes: &[u8]) -> &'static str {
+    let kinds: [(&[u8], _); 7] = [
+        (b"RIFF", "a WebP file"),
+        (b"\xabKTX", "a KTX file"),
+        (b"GIF8", "a GIF file"),
+        (b"BM", "a BMP file"),
+        (b"II*\0", "a TIFF file"),
+        (b"MM\0*", "a TIFF file"),
+        (b"DDS ", "a DDS file"),
+    ];
+    let found = kinds.iter().find(|(begin, _)| bytes.starts_with(begin));
+    found.map_or("a file of another kind", |(_, kind)| kind)
 }
 
 fn checked([columns, rows]: [usize; 2]) -> Result<[usize; 2], String> {
@@ -101,7 +139,7 @@ fn checked([columns, rows]: [usize; 2]) -> Result<[usize; 2], String> {
     if is_small && columns * rows <= MOST_TEXELS {
         return Ok([columns, rows]);
     }
-    Err(format!("a picture of {columns} x {rows}, of {MOST_TEXELS} places at most"))
+    Err(format!("a picture of {columns} x {rows}"))
 }
 
 fn read_png(bytes: &[u8]) -> Result<Texture, String> {
@@ -213,7 +251,8 @@ mod tests {
     fn what_is_no_picture_is_told_as_what_it_is() {
         let whole = png([2, 1], ColorType::Rgb, &[1, 2, 3, 4, 5, 6]);
         for (bytes, words) in [
-            (&b""[..], "a file of another kind"),
+            (&b""[..], "nothing"),
+            (b"%PDF", "a file of another kind"),
             (b"RIFF....WEBP", "a WebP file"),
             (&jpeg()[..40], "a damaged JPEG file"),
             (&whole[..whole.len() / 2], "a damaged PNG file"),

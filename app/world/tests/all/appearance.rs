@@ -81,17 +81,70 @@ fn faces_have_the_colour_and_the_texture_of_their_material() {
 }
 
 #[test]
+fn light_goes_through_a_texture_as_its_material_says() {
+    let half = |mode: &str| {
+        let mut made = Vec::new();
+        let mut encoder = png::Encoder::new(&mut made, 2, 1);
+        encoder.set_color(png::ColorType::Rgba);
+        encoder.set_depth(png::BitDepth::Eight);
+        let mut writer = encoder.write_header().expect("a header");
+        writer.write_image_data(&[255, 0, 0, 100, 0, 255, 0, 255]).expect("written");
+        writer.finish().expect("written");
+        let image = format!("{{\"uri\":\"data:;base64,{}\"}}", base64(&made));
+        let materials =
+            MATERIALS.replace("{\"name\": \"painted\",", &format!("{{\"name\": \"painted\",{mode}"));
+        let told = appearance(&gltf(&materials, &image));
+        let texture = told.finishes[0].texture.clone().expect("it has one");
+        (texture.is_clear, texture.texels.iter().map(|texel| texel[3]).collect::<Vec<_>>())
+    };
+    assert_eq!(half(""), (false, vec![255, 255]));
+    assert_eq!(half("\"alphaMode\":\"BLEND\","), (true, vec![100, 255]));
+    assert_eq!(half("\"alphaMode\":\"MASK\","), (true, vec![0, 255]));
+    assert_eq!(half("\"alphaMode\":\"MASK\",\"alphaCutoff\":0.3,"), (false, vec![255, 255]));
+}
+
+#[test]
+fn texture_coordinates_that_are_none_leave_the_rest_of_a_model_as_it_looks() {
+    let text = gltf(MATERIALS, &in_a_uri());
+    for (from, to, words) in [
+        (
+            "\"index\": 0,",
+            "\"index\": 0, \"texCoord\": 1,",
+            "meshes[0].primitives[0]: found no texture coordinates of set 1",
+        ),
+        ("\"type\":\"VEC2\"", "\"type\":\"VEC3\"", "accessors[1].type: found \"VEC3\"; allowed: VEC2"),
+        ("\"index\": 0,", "\"index\": 9,", "textures[9]: found no picture of its own"),
+    ] {
+        assert!(text.contains(from), "{from}");
+        let told = appearance(&text.replace(from, to));
+        assert!(told.unread.len() == 1 && told.unread[0].starts_with(words), "{words}: {:?}", told.unread);
+        assert!(told.finishes[1].colour.is_some() && told.uv.len() == 4);
+    }
+}
+
+#[test]
+fn a_model_names_the_files_that_it_consists_of() {
+    let place = tempfile::tempdir().expect("a directory");
+    let text = gltf(MATERIALS, r#"{"uri":"a%20b/c.png"},{"uri":"../d.png"},{"bufferView":0}"#);
+    let text = text.replace("\"buffers\":[", "\"buffers\":[{\"byteLength\":1,\"uri\":\"e.bin\"},");
+    let file = place.path().join("a.gltf");
+    std::fs::write(&file, text).expect("written");
+    assert_eq!(model::files_beside(&file), ["e.bin", "a b/c.png"].map(std::path::PathBuf::from));
+    assert_eq!(model::files_beside(&place.path().join("none.gltf")), Vec::<std::path::PathBuf>::new());
+}
+
+#[test]
 fn what_is_wrong_with_looks_is_told_and_what_can_be_felt_stays() {
     let cases = [
         (
             MATERIALS,
             r#"{"uri":"data:image/webp;base64,UklGRgAAAABXRUJQ"}"#,
-            "images[0]: found a WebP file; allowed: a PNG or JPEG file",
+            "images[0]: found a WebP file; allowed: a PNG or JPEG file of",
         ),
         (
             MATERIALS,
             r#"{"bufferView":1}"#,
-            "images[0]: found a file of another kind; allowed: a PNG or JPEG file",
+            "images[0]: found a file of another kind; allowed: a PNG or JPEG file of",
         ),
         (MATERIALS, r#"{"bufferView":9}"#, "bufferViews[9]: found a reference to nothing; allowed: 0 to 1"),
         (
@@ -161,6 +214,11 @@ fn a_texture_that_cannot_be_read_is_told_once_with_its_place() {
         seen(&gltf(MATERIALS, "{}"), "grid = { count = [2, 1, 1], spacing_m = [3, 3, 3] }\n");
     let seen = scene.seen();
     let told: Vec<String> = seen.plain.iter().map(|(at, why)| format!("{}: {why}", at.line)).collect();
-    assert_eq!(told, ["3: images[0]: found a file of another kind; allowed: a PNG or JPEG file"]);
+    assert_eq!(
+        told,
+        [
+            "3: images[0]: found nothing; allowed: a PNG or JPEG file of at most 67 million places, 16384 on a side"
+        ]
+    );
     assert_eq!(seen.parts.len(), 8);
 }

@@ -147,6 +147,11 @@ fn a_recording_that_is_damaged_is_exported_and_drawn_up_to_there_and_both_end_wi
     assert_says(&said.out, &["part.csv (49 rows, up to the damage)"]);
     let part = fs::read_to_string(place.path("part.csv")).expect("a table");
     assert!(good.starts_with(&part) && part.lines().count() == 50, "{part}");
+    // Empty lines behind the last row are none of its rows.
+    place.write("empty.csv", format!("{good}\n\r\n\n"));
+    let said = place.run(["export", "empty.csv", "all.csv"]);
+    assert_eq!((said.status, said.err.as_str()), (Some(0), ""));
+    assert_eq!(fs::read_to_string(place.path("all.csv")).expect("a table"), good);
     let said = place.run(["plot", "bad.csv"]);
     assert_eq!(said.status, Some(3), "{}", said.err);
     assert_says(&said.err, &["bad.csv", "what is whole before it is used: 49 rows, up to t = 0.048 s"]);
@@ -164,7 +169,7 @@ fn a_table_that_export_calls_damaged_is_called_so_by_plot_in_the_same_words() {
     let state = ["stick", "slip", "free"].into_iter().find(|state| row.contains(&format!(",{state},")));
     let state = state.expect("a state");
     for (text, words) in [
-        (with_row(String::new()), "bad.csv:51: found 1 cells, expected"),
+        (with_row(String::new()), "bad.csv:51: found an empty line"),
         (
             with_row(row.replacen(state, "sliding", 1)),
             "bad.csv:51: f0_friction is \"sliding\", which is no word",
@@ -189,6 +194,17 @@ fn a_table_that_export_calls_damaged_is_called_so_by_plot_in_the_same_words() {
     }
     place.write("bad.csv", [0x80, 0xff, b'\n']);
     assert_says(&refused(&place, &["plot", "bad.csv"]), &["bad.csv is no recording", "it is no text"]);
+}
+
+#[test]
+fn a_name_that_means_another_kind_of_picture_is_refused() {
+    let (place, _) = with_table();
+    for name in ["-", "forces.pdf", "a/forces.JPG"] {
+        let before = place.snapshot();
+        let words = refused(&place, &["plot", "r.csv", "--out", name]);
+        assert_says(&words, &["--out: found", "allowed: a name without ending"]);
+        assert_eq!(place.snapshot(), before);
+    }
 }
 
 #[test]

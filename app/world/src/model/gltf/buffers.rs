@@ -120,11 +120,7 @@ impl<'b> Buffers<'b> {
     }
 
     fn read(&mut self, uri: &str, place: &str) -> Result<Vec<u8>, ModelError> {
-        let path = unescaped(uri);
-        let is_below = !path.is_empty()
-            && Path::new(&path).components().all(|part| matches!(part, Component::Normal(_)));
-        let file = PathBuf::from(path);
-        let (Some(beside), true) = (self.beside, is_below) else {
+        let (Some(beside), Some(file)) = (self.beside, below(uri)) else {
             let allowed =
                 "a file beside this one or in a directory there, or a data URI; or export it as GLB";
             return Err(wrong(format!("{place}.uri"), shown(uri.as_bytes()), allowed));
@@ -142,6 +138,14 @@ impl<'b> Buffers<'b> {
         }
         Ok(bytes)
     }
+}
+
+/// The path that a URI is from a model's directory, if it leads nowhere else.
+pub(super) fn below(uri: &str) -> Option<PathBuf> {
+    let path = unescaped(uri);
+    let is_below =
+        !path.is_empty() && Path::new(&path).components().all(|part| matches!(part, Component::Normal(_)));
+    is_below.then(|| path.into())
 }
 
 /// Of a data URI without its beginning.

@@ -76,6 +76,7 @@ pub(super) struct Material {
     pub(super) name: Name,
     pub(super) pbr_metallic_roughness: Value,
     pub(super) alpha_mode: Name,
+    pub(super) alpha_cutoff: Value,
 }
 
 /// Of a node, a mesh or a material, or its mode; whatever is no text is none.

@@ -12,7 +12,8 @@ use serde_json::Value;
 use super::buffers::Buffers;
 use super::document::{Document, Material};
 use crate::model::appearance::Finish;
-use crate::model::texture::{Texture, Wrap};
+use crate::model::shown;
+use crate::model::texture::{ALLOWED, Texture, Wrap};
 
 /// The finishes of a file's materials, and one more for faces of none.
 pub(super) struct Materials {
@@ -26,8 +27,25 @@ pub(super) struct Materials {
 /// Of all pictures of a file together: half a gigabyte.
 const MOST_TEXELS: usize = 1 << 27;
 
-/// An image and what lies beyond its edges, and the texture, if it could be read.
-type Known = (usize, [Wrap; 2], Option<Arc<Texture>>);
+/// Where the bytes of an image are.
+#[derive(Clone, PartialEq, Eq)]
+enum Origin {
+    Uri(String),
+    View(usize),
+    Nowhere,
+}
+
+/// What light does where a texture is not opaque.
+#[derive(Clone, Copy, PartialEq)]
+enum Mode {
+    Opaque,
+    Clear,
+    /// It goes through where the opacity is less.
+    Cut(f64),
+}
+
+/// A texture, or none if it could not be read, and what it was made of.
+type Known = (Origin, [Wrap; 2], Mode, Option<Arc<Texture>>);
 
 /// Which texture coordinates, and what is done to them.
 #[derive(Clone, Copy)]
@@ -111,7 +129,9 @@ impl Materials {
         for material in &document.materials {
             let pbr = Pbr::deserialize(&material.pbr_metallic_roughness).unwrap_or_default();
             let info = pbr.base_color_texture.as_ref();
-            let texture = info.and_then(|info| read.texture(info.index, document, buffers, &mut images));
+            let mode = mode(material);
+            let texture =
+                info.and_then(|info| read.texture(info.index, mode, (document, buffers), &mut images));
             let lie = texture.as_ref().and(info).map(TextureInfo::lie);
             let says_nothing = pbr.base_color_factor.is_none() && texture.is_none();
             let colour = (!says_nothing).then(|| colour(pbr.base_color_factor.unwrap_or([1.0; 4]), material));
@@ -132,12 +152,15 @@ impl Materials {
     fn texture(
         &mut self,
         index: usize,
-        document: &Document,
-        buffers: &mut Buffers<'_>,
+        mode: Mode,
+        (document, buffers): (&Document, &mut Buffers<'_>),
         images: &mut Vec<Known>,
     ) -> Option<Arc<Texture>> {
         let of: TextureOf = element(&document.textures, index);
-        let source = of.source?;
+        let Some(source) = of.source else {
+            self.unread.push(format!("textures[{index}]: found no picture of its own; allowed: {ALLOWED}"));
+            return None;
+        };
         let sampler = of.sampler.map(|sampler| element::<Sampler>(&document.samplers, sampler));
         let sampler = sampler.unwrap_or_default();
         let wraps = [sampler.wrap_s, sampler.wrap_t].map(|wrap| match wrap {
@@ -145,19 +168,34 @@ impl Materials {
             33648 => Wrap::Mirror,
             _ => Wrap::Repeat,
         });
-        if let Some((.., known)) = images.iter().find(|(of, by, _)| (*of, *by) == (source, wraps)) {
-            return known.clone();
-        }
         let image: Image = element(&document.images, source);
         let place = format!("images[{source}]");
-        let bytes = match (&image.uri, image.buffer_view) {
-            (Some(uri), _) => buffers.of_uri(uri, &place).map(Some),
-            (None, Some(view)) => buffers.of_view(document, view).map(|bytes| Some(bytes.to_vec())),
-            _ => Ok(None),
+        let origin = match (image.uri, image.buffer_view) {
+            (Some(uri), _) => Origin::Uri(uri),
+            (None, Some(view)) => Origin::View(view),
+            _ => Origin::Nowhere,
+        };
+        // Many images may be one picture.
+        let is_it = |(of, by, how, _): &&Known| (of, by, how) == (&origin, &wraps, &mode);
+        if let Some((.., known)) = images.iter().find(is_it) {
+            return known.clone();
+        }
+        let bytes = match &origin {
+            Origin::Uri(uri) => buffers.of_uri(uri, &place),
+            Origin::View(view) => buffers.of_view(document, *view).map(<[u8]>::to_vec),
+            Origin::Nowhere => Ok(Vec::new()),
+        };
+        let named = match &origin {
+            Origin::Uri(uri) if !uri.starts_with("data:") => format!("{place} ({})", shown(uri.as_bytes())),
+            _ => place.clone(),
         };
         let read = bytes.map_err(|error| error.to_string()).and_then(|bytes| {
-            let read = Texture::read(&bytes.unwrap_or_default());
-            read.map_err(|found| format!("{place}: found {found}; allowed: a PNG or JPEG file"))
+            Texture::read(&bytes).map_err(|found| format!("{named}: found {found}; allowed: {ALLOWED}"))
+        });
+        let read = read.map(|texture| match mode {
+            Mode::Opaque => texture.opaque(),
+            Mode::Clear => texture.cleared(None),
+            Mode::Cut(cutoff) => texture.cleared(Some(cutoff)),
         });
         let read = read.and_then(|texture| match self.texels_left.checked_sub(texture.texels.len()) {
             Some(left) => {
@@ -170,7 +208,7 @@ impl Materials {
         });
         let read = read.map_err(|said| self.unread.push(said)).ok();
         let texture = read.map(|texture| Arc::new(Texture { wraps, ..texture }));
-        images.push((source, wraps, texture.clone()));
+        images.push((origin, wraps, mode, texture.clone()));
         texture
     }
 }
@@ -193,6 +231,17 @@ fn colour([r, g, b, opacity]: [f64; 4], material: &Material) -> [f64; 4] {
         let share = share.clamp(0.0, 1.0);
         if share <= 0.003_130_8 { 12.92 * share } else { 1.055 * share.powf(1.0 / 2.4) - 0.055 }
     };
-    let is_clear = material.alpha_mode.0.as_deref() == Some("BLEND");
+    let is_clear = mode(material) == Mode::Clear;
     [seen(r), seen(g), seen(b), if is_clear { opacity.clamp(0.0, 1.0) } else { 1.0 }]
 }
+
+fn mode(material: &Material) -> Mode {
+    match material.alpha_mode.0.as_deref() {
+        Some("BLEND") => Mode::Clear,
+        Some("MASK") => Mode::Cut(material.alpha_cutoff.as_f64().unwrap_or(USUAL_CUTOFF)),
+        _ => Mode::Opaque,
+    }
+}
+
+/// The format's.
+const USUAL_CUTOFF: f64 = 0.5;
