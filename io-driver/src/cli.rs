@@ -218,8 +218,7 @@ fn report(result: Result<(), AttachError>) -> ExitCode {
 
 /// Somebody who listens and does not answer may have heard all the same; from everybody else nothing came.
 fn fail_to_ask(error: &AttachError) -> ExitCode {
-    let is_open = matches!(error, AttachError::NoAnswer { .. } | AttachError::HungUp { .. });
-    fail(error, if is_open { EXIT_FAULT } else { EXIT_USAGE })
+    fail(error, if error.may_be_heard() { EXIT_FAULT } else { EXIT_USAGE })
 }
 
 pub(crate) fn fail(error: &dyn std::error::Error, code: u8) -> ExitCode {

@@ -99,6 +99,17 @@ pub enum AttachError {
         /// Socket that it listened at.
         socket: PathBuf,
     },
+    /// It was asked, and its answer cannot be read here.
+    #[error(
+        "the driver at {socket} may have heard it, but its answer cannot be read: {source}; look how things stand \
+         (`io-driver status`)"
+    )]
+    Unread {
+        /// Socket that it listens at.
+        socket: PathBuf,
+        /// What the system said.
+        source: io::Error,
+    },
     /// The driver speaks another major version.
     #[error(
         "the driver speaks ABI version {found}, this program {expected}; install both from the same release"
@@ -286,8 +297,13 @@ fn exchange(socket: &Path, request: &Request) -> Result<(Answer, Vec<OwnedFd>, O
         Err(error) if error.kind() != io::ErrorKind::BrokenPipe => return Err(talk_error(socket, error)),
         _ => {}
     }
-    let (mut answer, fds) = socket::receive::<Answer>(connection.as_fd(), ANSWER_TIMEOUT)
-        .map_err(|error| talk_error(socket, error))?;
+    let (mut answer, fds) =
+        socket::receive::<Answer>(connection.as_fd(), ANSWER_TIMEOUT).map_err(|error| {
+            match talk_error(socket, error) {
+                AttachError::System { socket, source, .. } => AttachError::Unread { socket, source },
+                told => told,
+            }
+        })?;
     number_as_here(&mut answer, &connection);
     judge(socket, request, &answer)?;
     Ok((answer, fds, connection))
@@ -336,7 +352,8 @@ fn judge(socket: &Path, request: &Request, answer: &Answer) -> Result<(), Attach
             "its loop collects no requests; see with `io-driver status` whether its ticks go on".into(),
         )),
         Some(Verdict::Outdated) => Err(AttachError::Refused(
-            "it heard this too late: an emergency stop came after it was asked, or more than a second went by; look \
+            "it heard this too late: an emergency stop came after it was asked, more than a second went by, or you are in another time namespace than \
+             it; look \
              how things stand, then ask again"
                 .into(),
         )),
@@ -420,6 +437,13 @@ fn no_permission(path: &Path) -> AttachError {
         None => (path.to_path_buf(), 0, 0, 0),
     };
     AttachError::NoPermission { socket, mode, owner, group, user: rustix::process::geteuid().as_raw() }
+}
+
+impl AttachError {
+    /// Whether the driver may have done what it was asked.
+    pub fn may_be_heard(&self) -> bool {
+        matches!(self, Self::NoAnswer { .. } | Self::HungUp { .. } | Self::Unread { .. })
+    }
 }
 
 /// A driver that was killed is gone by now, and one that ended has removed its socket; another call tells.

@@ -338,7 +338,7 @@ impl Server {
         }
         let Peer { pid, uid, .. } = self.connections[index].peer;
         let pid = u64::from(pid);
-        let asked_ns = self.asked_ns(request);
+        let asked_ns = self.asked_ns(request, kind);
         match kind {
             RequestKind::Observe => self.let_observe(index, memory),
             RequestKind::Command => self.lease_to(index, request, memory, to),
@@ -360,11 +360,15 @@ impl Server {
     }
 
     /// When it was asked. Clients of before 1.3 do not tell; what they say is heard in the turn after they said it, unless
-    /// there is a crowd.
-    fn asked_ns(&self, request: &Request) -> u64 {
+    /// there is a crowd. A time that is still to come is that of another clock, as time namespaces have: then a stop was
+    /// asked for now, and everything else long ago, so that it undoes no stop.
+    fn asked_ns(&self, request: &Request, kind: RequestKind) -> u64 {
+        let now_ns = handshake::monotonic_ns();
         match request.asked_ns {
             0 => self.turns_ns[0],
-            told => told.min(handshake::monotonic_ns()),
+            told if told <= now_ns => told,
+            _ if kind == RequestKind::EmergencyStop => now_ns,
+            _ => 0,
         }
     }
 

@@ -16,6 +16,8 @@ use std::time::{Duration, Instant};
 
 /// Time for the loop to do what it was asked, beyond a few ticks.
 pub(super) const PROMPT: Duration = Duration::from_millis(100);
+/// Cards have taken power by then, or have told that they do not.
+const ARMED: Duration = Duration::from_millis(250);
 /// Between two looks at the frames.
 pub(super) const LOOK: Duration = Duration::from_millis(1);
 const NAME: &str = "io-driver";
@@ -83,11 +85,24 @@ fn seen_after(driver: &DriverView) -> Option<Seen> {
         let frame = driver.read_latest().filter(|frame| frame.tick >= settled);
         let is_fault = frame.is_some_and(|frame| frame.state == DriverState::Fault as u64);
         match frame {
-            Some(_) if !is_fault => return Some(Seen::NoFault),
+            Some(_) if !is_fault => return Some(comes_again(driver).map_or(Seen::NoFault, Seen::Fault)),
             frame if Instant::now() >= until => return frame.map(|frame| Seen::Fault(frame.fault)),
             _ => std::thread::sleep(LOOK),
         }
     }
+}
+
+/// The fault that comes while what drives the motors gets ready, if one does: amplifiers that do not take power tell only then.
+fn comes_again(driver: &DriverView) -> Option<u64> {
+    let until = Instant::now() + ARMED;
+    while Instant::now() < until {
+        let frame = driver.read_latest().filter(|frame| frame.state == DriverState::Fault as u64);
+        if let Some(frame) = frame {
+            return Some(frame.fault);
+        }
+        std::thread::sleep(LOOK);
+    }
+    None
 }
 
 #[cfg(test)]
@@ -112,6 +127,25 @@ mod tests {
         assert!(seen_after(&driver).is_none(), "there is no frame at all");
         tell(&memory, 7, DriverState::Idle);
         assert!(seen_after(&driver).is_none());
+    }
+
+    #[test]
+    fn a_fault_that_comes_again_while_cards_take_power_is_told() {
+        let memory = memory();
+        let driver = DriverView::map(memory.fd()).expect("our own");
+        tell(&memory, 7, DriverState::Fault);
+        std::thread::scope(|scope| {
+            let seen = scope.spawn(|| seen_after(&driver));
+            std::thread::sleep(Duration::from_millis(20));
+            (8..20).for_each(|tick| tell(&memory, tick, DriverState::Idle));
+            std::thread::sleep(ARMED / 2);
+            tell(&memory, 20, DriverState::Fault);
+            match seen.bounded_join().expect("no panic") {
+                Some(Seen::Fault(reason)) => assert_eq!(reason, FaultReason::EmergencyStop as u64),
+                Some(Seen::NoFault) => println!("the machine was too slow to tell"),
+                None => println!("the machine was too slow to look"),
+            }
+        });
     }
 
     #[test]

@@ -101,8 +101,9 @@ impl ZeroError {
     fn is_usage(&self) -> bool {
         !matches!(
             self,
-            Self::Attach(AttachError::NoAnswer { .. } | AttachError::HungUp { .. })
-                | Self::Silent(_)
+            Self::Attach(
+                AttachError::NoAnswer { .. } | AttachError::HungUp { .. } | AttachError::Unread { .. }
+            ) | Self::Silent(_)
                 | Self::DriverGone
                 | Self::Interrupted
                 | Self::Moving { .. }
@@ -316,8 +317,7 @@ impl<'a> Zeroing<'a> {
             if is_due && !self.was_granted(devices, &was_withheld) {
                 let answer = client::zero(self.socket, NAME, bits);
                 // What was not answered may have been heard.
-                *was_asked |=
-                    matches!(answer, Ok(()) | Err(AttachError::NoAnswer { .. } | AttachError::HungUp { .. }));
+                *was_asked |= answer.as_ref().map_or_else(AttachError::may_be_heard, |()| true);
                 answer?;
                 asked = Some(Instant::now());
             }

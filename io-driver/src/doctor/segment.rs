@@ -158,7 +158,8 @@ fn socket(_: &Machine<'_>, _: &str, answer: &Answer) -> Judged {
             | AttachError::NothingToAttach { .. }
             | AttachError::Refused(_)
             | AttachError::LeaseHeld { .. }
-            | AttachError::System { .. },
+            | AttachError::System { .. }
+            | AttachError::Unread { .. },
         ) => {
             let text = "ask as a user who may use the socket";
             Judgement::unreadable(told(answer), Remedy::words(text))

@@ -74,14 +74,23 @@ fn who_knocks_in_a_flood_is_let_in_when_the_listener_has_rested() {
 /// When a stop was asked that says this of it, and the time before the turn in which it came in, before it was
 /// written, and after it was heard.
 fn asked(claimed_ns: impl FnOnce() -> u64) -> (u64, [u64; 3]) {
+    asked_for(RequestKind::EmergencyStop, claimed_ns)
+}
+
+fn asked_for(kind: RequestKind, claimed_ns: impl FnOnce() -> u64) -> (u64, [u64; 3]) {
     let mut desk = Desk::open();
     let before_turn = monotonic_ns();
     let mut stream = desk.connect();
     let before = monotonic_ns();
-    let request = Request { asked_ns: claimed_ns(), ..Request::new(RequestKind::EmergencyStop, "test") };
+    let request = Request { asked_ns: claimed_ns(), ..Request::new(kind, "test") };
     stream.write_all(bytemuck::bytes_of(&request)).unwrap();
     desk.poll(limit());
-    let [ServerEvent::EmergencyStopRequested { asked_ns, .. }] = desk.events[..] else {
+    let [
+        ServerEvent::EmergencyStopRequested { asked_ns, .. }
+        | ServerEvent::ClearFaultRequested { asked_ns, .. }
+        | ServerEvent::ZeroRequested { asked_ns, .. },
+    ] = desk.events[..]
+    else {
         panic!("{:?}", desk.events);
     };
     (asked_ns, [before_turn, before, monotonic_ns()])
@@ -97,6 +106,15 @@ fn a_request_was_asked_when_its_client_says_and_never_later_than_it_was_heard() 
     assert_eq!(asked_ns, told);
     let (asked_ns, [_, before, heard]) = asked(|| u64::MAX);
     assert!((before..=heard).contains(&asked_ns), "{asked_ns}: {before} to {heard}");
+}
+
+/// Clocks of other time namespaces are ahead or behind.
+#[test]
+fn whoever_asks_by_a_clock_that_is_ahead_undoes_no_stop() {
+    for kind in [RequestKind::ClearFault, RequestKind::Zero] {
+        let (asked_ns, _) = asked_for(kind, || monotonic_ns() + 1_000_000_000_000);
+        assert_eq!(asked_ns, 0, "{kind:?}: as long ago as can be");
+    }
 }
 
 #[test]

@@ -375,7 +375,12 @@ fn whatever_call_of_the_service_fails_the_motors_can_be_stopped_or_are_off() {
         };
         let stand = &mut harmed.stand;
         let _ = stop_socket::send(&stand.socket());
-        wait_for(&when, || stand.driver.has_ended() || !stand.amplifiers.are_enabled());
+        // Amplifiers are off for a moment, too, where a starved commander's replies are late.
+        wait_for(&when, || {
+            let latest = stand.view().read_latest();
+            stand.driver.has_ended()
+                || latest.is_some_and(|frame| frame.fault == FaultReason::EmergencyStop as u64)
+        });
         stand.amplifiers.settle();
         stand.amplifiers.check_off(&when);
         if !stand.driver.has_ended() {
