@@ -73,7 +73,7 @@ struct Understood {
     origins: Vec<usize>,
     /// Names of its faces, if the format has any.
     names: Option<FaceNames>,
-    /// What cannot be read of how it looks.
+    /// Parts of its looks that cannot be read.
     unread: Vec<String>,
     low: Vector3<f64>,
     high: Vector3<f64>,

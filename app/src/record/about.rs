@@ -45,7 +45,7 @@ pub struct InputFile {
 }
 
 impl InputFile {
-    /// Whether it is a model or a picture, or a part of one.
+    /// True for a model or a picture, or a part of one.
     pub fn is_of_a_model(&self) -> bool {
         ["model:", BESIDE].iter().any(|what| self.name.starts_with(what))
     }

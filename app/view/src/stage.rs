@@ -63,9 +63,9 @@ pub struct Thing {
     pub pose: Isometry3<f64>,
     /// Red, green, blue, opacity: 0 to 1.
     pub colour: [f64; 4],
-    /// Whether scene or file say the colour.
+    /// True where scene or file say the colour.
     pub is_coloured: bool,
-    /// What lies on the triangles, whose colours are multiplied with it.
+    /// Texture on the triangles; its colours are multiplied with `colour`.
     pub texture: Option<Arc<Texture>>,
     /// Whether light does not go through.
     pub casts_shadow: bool,
@@ -74,7 +74,7 @@ pub struct Thing {
 }
 
 impl Thing {
-    /// Whether light goes through it, somewhere at least.
+    /// True if light goes through it, somewhere at least.
     pub(crate) fn is_clear(&self) -> bool {
         self.colour[3] < 1.0 || self.texture.as_ref().is_some_and(|texture| texture.is_clear)
     }

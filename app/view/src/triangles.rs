@@ -12,7 +12,7 @@ pub struct Triangles {
     pub normals: Vec<Vector3<f64>>,
     /// Three corners of each triangle.
     pub corners: Vec<[u32; 3]>,
-    /// Where each corner is on a texture, in pictures from the upper left corner; none where nothing lies on them.
+    /// Places of the corners on a texture, in pictures from the upper left corner; none where nothing lies on them.
     pub uv: Vec<[f64; 2]>,
 }
 

@@ -263,7 +263,7 @@ pub fn read_names(file: &Path, bytes: &[u8]) -> Result<Option<FaceNames>, ModelE
     })
 }
 
-/// Whether a file of this name may say how its faces look.
+/// True if a file of this name may say how its faces look.
 pub fn may_have_appearance(file: &Path) -> bool {
     Format::of(file, b"").is_none_or(|format| format == Format::Gltf)
 }
@@ -281,7 +281,7 @@ pub fn files_beside(file: &Path) -> Vec<PathBuf> {
     }
 }
 
-/// How the faces that [`read`] reads look; `None`: the format has nothing on that, or nothing of it is read.
+/// Looks of the faces that [`read`] reads; `None`: the format has nothing on that, or nothing of it is read.
 ///
 /// # Errors
 /// As [`read`].

@@ -51,14 +51,14 @@ pub struct SeenPart<'s> {
     pub X_BV: Isometry3<f64>,
     /// Red, green, blue and opacity, 0 to 1.
     pub colour: [f64; 4],
-    /// Whether scene or file say the colour.
+    /// True where scene or file say the colour.
     pub is_coloured: bool,
     /// Whether it casts a shadow.
     pub casts_shadow: bool,
 }
 
 impl SeenPart<'_> {
-    /// What lies on its triangles.
+    /// Texture on its triangles.
     pub fn texture(&self) -> Option<Arc<Texture>> {
         match &self.form {
             SeenForm::Triangles { painting, .. } => {
@@ -78,7 +78,7 @@ pub enum SeenForm<'s> {
         soup: Arc<TriangleSoup>,
         /// Above 0.
         scale: [f64; 3],
-        /// What lies on them.
+        /// Texture on them.
         painting: Option<Arc<Painting>>,
     },
     /// Closed forms, trees and patches: by their sizes.

@@ -11,9 +11,9 @@ use super::texture::Texture;
 pub struct Appearance {
     /// Looks that are told apart.
     pub finishes: Vec<Finish>,
-    /// Which of them each face has.
+    /// Number of that which each face has.
     pub of_face: Vec<u32>,
-    /// Of each face, where its corners lie on the finish's texture, in pictures from its upper left corner.
+    /// Places of each face's corners on the finish's texture, in pictures from its upper left corner.
     pub uv: Vec<CornerUv>,
     /// Pictures that cannot be shown, each with what was found and what is allowed.
     pub unread: Vec<String>,
@@ -24,12 +24,12 @@ pub struct Appearance {
 pub struct Finish {
     /// Red, green, blue and opacity, 0 to 1, as a scene's colours are; `None`: the file says nothing.
     pub colour: Option<[f64; 4]>,
-    /// What lies on it; its colours are multiplied with `colour`.
+    /// Picture on it; its colours are multiplied with `colour`.
     pub texture: Option<Arc<Texture>>,
 }
 
 impl Appearance {
-    /// Whether it says anything.
+    /// True if it says anything.
     pub fn is_told(&self) -> bool {
         self.finishes.iter().any(|finish| *finish != Finish::default())
     }

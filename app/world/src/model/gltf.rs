@@ -60,7 +60,7 @@ pub(super) fn names_beside(bytes: &[u8]) -> Vec<PathBuf> {
     uris.filter_map(buffers::below).collect()
 }
 
-/// How the triangles look.
+/// Looks of the triangles, for whoever draws them.
 ///
 /// # Errors
 /// As [`read_gltf`].

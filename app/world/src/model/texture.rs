@@ -19,13 +19,13 @@ pub struct Texture {
     pub size: [u32; 2],
     /// Red, green, blue and opacity of each place, as screens show them (sRGB); rows from above.
     pub texels: Vec<[u8; 4]>,
-    /// What lies beyond its edges, along its rows and along its columns.
+    /// Continuation beyond its edges, along its rows and along its columns.
     pub wraps: [Wrap; 2],
-    /// Whether light goes through where it is not opaque.
+    /// True if light goes through where it is not opaque.
     pub is_clear: bool,
 }
 
-/// What lies beyond the edge of a picture.
+/// Continuation beyond the edge of a picture.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub enum Wrap {
     /// The picture again.
