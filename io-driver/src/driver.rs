@@ -177,7 +177,7 @@ pub fn run(config: &DriverConfig, options: &RunOptions) -> Result<(), RunError> 
     // The last threads: the sandbox lets none be started.
     let no_thread = |what| move |source| RunError::NoThread { what, source };
     let (stop_socket, stop_file) = StopSocket::bind(server.path())?;
-    stop_thread::start(stop_socket, sender.urgent.clone(), options.quiet)
+    stop_thread::start(stop_socket, sender.urgent.clone(), options.quiet, config.real_time.priority)
         .map_err(no_thread("listen for stops"))?;
     let lost = drain.lost_count();
     log_thread::start_for_driver(drain, options.quiet).map_err(no_thread("start the log"))?;

@@ -63,6 +63,13 @@ impl SetupGuards {
     }
 }
 
+/// Gives the calling thread a priority before those of ordinary threads, if the system lets it have one: for a thread beside a
+/// loop that sleeps nearly always, and must not be starved by others when it is needed.
+pub fn promote(priority: u8) {
+    // A loop that gets no real time itself has told so.
+    let _ = scheduling::promote(priority);
+}
+
 /// Does what `request` asks for to the calling thread and its process, and reports what is in force.
 ///
 /// With a policy come the circumstances that decide its worth: kernel, throttling, fair server; with a

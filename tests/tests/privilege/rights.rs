@@ -108,6 +108,18 @@ fn hundreds_of_leases_in_a_row_find_memory_without_the_capability_to_lock_it() {
     check_leases(&driver, 300);
 }
 
+/// Real-time priority and scheduling policy (1: SCHED_FIFO) of the thread of this name.
+fn policy_of(process: u32, name: &str) -> Option<[u64; 2]> {
+    let threads = std::fs::read_dir(format!("/proc/{process}/task")).ok()?;
+    threads.flatten().find_map(|thread| {
+        let stat = std::fs::read_to_string(thread.path().join("stat")).ok()?;
+        let (_, rest) = stat.split_once(&format!("({name}) "))?;
+        // proc(5): behind the name comes the third field.
+        let fields: Vec<&str> = rest.split_whitespace().collect();
+        Some([fields.get(37)?.parse().ok()?, fields.get(38)?.parse().ok()?])
+    })
+}
+
 /// As after `setcap`, or with AmbientCapabilities= in a systemd unit.
 #[test]
 fn capabilities_give_real_time_and_are_given_up() {
@@ -123,6 +135,8 @@ fn capabilities_give_real_time_and_are_given_up() {
     let report = driver.observe().driver.info().setup_report;
     assert!(report.contains("obtained  scheduling: SCHED_FIFO 1"), "{report}");
     assert!(report.contains("obtained  memory locked: "), "{report}");
+    // So has the thread that takes stops: ordinary ones wait for real time on all CPUs.
+    assert_eq!(policy_of(driver.child.id(), "stop"), Some([1, 1]));
     assert!(threads_of(driver.child.id()).iter().all(|status| status["Uid"].starts_with("65534")));
     check_leases(&driver, 300);
 }
