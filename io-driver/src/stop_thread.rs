@@ -27,7 +27,8 @@ const TAKEN_WITHIN: Duration = Duration::from_millis(5);
 const STACK_BYTES: usize = 64 * 1024;
 
 /// Starts them; from now on all other threads leave signals to the first. Beside a loop of a real-time priority it has the
-/// next lower one: programs of real time that fill all CPUs keep no stop waiting.
+/// next lower one, if the limits allow it (RLIMIT_RTPRIO): programs of real time that fill all CPUs keep no stop waiting. What
+/// capabilities allow is given up before it starts.
 ///
 /// # Errors
 /// What the system says to other threads, or to their signals.
