@@ -91,12 +91,12 @@ impl RecordingError {
         Self::OfEvents(Box::new(self))
     }
 
-    /// What went wrong, of whichever kind of file.
+    /// Failure of the write, of whichever kind of file.
     pub fn cause(&self) -> &Self {
         if let Self::OfEvents(error) = self { error.cause() } else { self }
     }
 
-    /// Whether nothing was recorded yet.
+    /// True if nothing was recorded yet.
     pub fn is_of_the_start(&self) -> bool {
         matches!(
             self.cause(),

@@ -36,7 +36,7 @@ pub struct Status {
     pub tick: Option<u64>,
     /// Age of that tick (s), if a loop in real time should have had others since: it hangs, or is stopped.
     pub silent_for_s: Option<f64>,
-    /// Whether its clock is shifted against ours, so that ages are not known: one of us lives in another time namespace.
+    /// True if its clock is shifted against ours, so that ages are not known: one of us lives in another time namespace.
     pub other_time_namespace: bool,
     /// State of the driver.
     pub state: &'static str,
@@ -401,7 +401,7 @@ fn silence_s(info: &DriverInfo, frame: &Frame, now_ns: u64) -> Option<f64> {
     is_silent.then_some(age_ns as f64 / 1e9)
 }
 
-/// Whether the driver's clock is shifted against ours. Where the kernel does not tell, frames do: one of the future, or
+/// True if the driver's clock is shifted against ours. Where the kernel does not tell, frames do: one of the future, or
 /// another one that is old when it is new.
 fn has_other_clock(driver: &DriverView, info: &DriverInfo, frame: &Frame, driver_pid: u64) -> bool {
     if let Some(is_shared) = time_namespace::is_clock_shared_with(driver_pid) {

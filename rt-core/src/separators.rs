@@ -4,7 +4,7 @@
 //! them by tabs. A reader that expects commas sees one long column, or twice as many cells, and complains of those.
 //! Model: nothing is guessed and read; the hint says what was probably found and what is needed.
 
-/// What to say of a text whose lines end in carriage returns alone.
+/// Words for a text whose lines end in carriage returns alone.
 pub fn mistaken_ends(text: &str) -> Option<&'static str> {
     let is_of_returns = text.trim_end_matches('\r').contains('\r') && !text.contains('\n');
     is_of_returns.then_some(

@@ -7,7 +7,7 @@
 
 use std::fs;
 
-/// Whether that process has the same clock; `None`: the kernel does not tell.
+/// True if that process has the same clock; `None`: the kernel does not tell.
 #[must_use]
 pub fn is_clock_shared_with(pid: u64) -> Option<bool> {
     if pid == 0 {

@@ -61,7 +61,7 @@ fn number_with_unit(before: &str, rest: &str) -> Option<String> {
     is_one.then(|| format!("found {value}, allowed: a number alone; {NO_UNITS}"))
 }
 
-/// What to say of a text in quotes where a number is expected.
+/// Words for a text in quotes where a number is expected.
 pub fn hint_for_text(text: &str) -> String {
     if has_unit(text.trim()) {
         format!("; {NO_UNITS}")

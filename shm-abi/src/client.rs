@@ -440,7 +440,7 @@ fn no_permission(path: &Path) -> AttachError {
 }
 
 impl AttachError {
-    /// Whether the driver may have done what it was asked.
+    /// True if the driver may have done what it was asked.
     pub fn may_be_heard(&self) -> bool {
         matches!(self, Self::NoAnswer { .. } | Self::HungUp { .. } | Self::Unread { .. })
     }

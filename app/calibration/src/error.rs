@@ -80,7 +80,7 @@ pub enum CalibrationError {
          lengths are measured. {}", ask_unit(*unit)
     )]
     OtherUnit {
-        /// Whose are larger.
+        /// Name of that one whose distances are larger.
         whose: &'static str,
         /// By how much.
         ratio: f64,

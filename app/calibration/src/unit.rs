@@ -39,7 +39,7 @@ impl Unit {
 /// In so many centimetres no desktop device's points lie.
 const MOST_CENTIMETRES: f64 = 150.0;
 
-/// What to ask, and what to do.
+/// Question to the user, and advice.
 pub(crate) fn ask_unit(unit: Option<Unit>) -> String {
     match unit.map(Unit::told) {
         Some((_, name, factor)) => {

@@ -252,7 +252,7 @@ pub fn run(args: &CalibrateArgs) -> ExitCode {
 }
 
 impl CalibrateFailure {
-    /// Whether it went wrong after it had begun.
+    /// True if it went wrong after it had begun.
     fn is_fault(&self) -> bool {
         match self {
             Self::Live(error) => error.is_fault(),

@@ -37,7 +37,7 @@ pub(super) const MOST_FILE_BYTES: u64 = 2 * MAX_TABLE_BYTES + MOST_MODEL_BYTES;
 /// A file that the run read.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct InputFile {
-    /// What it is to the run: `scene`, `hand`, `layout` or `model`; then `:` and its path. A file that a model consists of
+    /// Part that it has in the run: `scene`, `hand`, `layout` or `model`; then `:` and its path. A file that a model consists of
     /// beside itself is `beside`, its path is a list in JSON: that of the model, and its own from the model's directory.
     pub name: String,
     /// Its content.

@@ -29,7 +29,7 @@ impl<'c> Sample<'c> {
         Self { contains, boxes: RefCell::default() }
     }
 
-    /// Where the boundary is crossed on the way to a box' nodes.
+    /// Crossings of the boundary on the way to a box' nodes.
     fn crossings(&self, number: [i32; 3]) -> Vec<Vector3<f64>> {
         // Off the planes of the solids.
         let node = |n: [i32; 3]| Vector3::from(n.map(|i| (f64::from(i) + 0.4142) * PITCH_M));

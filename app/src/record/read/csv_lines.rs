@@ -20,7 +20,7 @@ pub(crate) struct CsvLines {
     is_first: bool,
     /// Read already, to know whether the empty lines before it are the end.
     next: Option<String>,
-    /// How the table ends, if that is in the middle of a line.
+    /// End of the table, if that is in the middle of a line.
     pub(crate) cut: Option<String>,
 }
 

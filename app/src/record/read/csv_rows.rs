@@ -93,7 +93,7 @@ impl CsvRows {
         ReadError::BadRow { file: self.file.clone(), line, why }
     }
 
-    /// How the table ends, if that is in the middle of a row.
+    /// End of the table, if that is in the middle of a row.
     pub(super) fn cut(&self) -> Option<&str> {
         self.lines.cut.as_deref()
     }

@@ -1,4 +1,4 @@
-//! How a model's file says that its faces look.
+//! Looks of a model's faces, as its file says.
 
 use std::sync::Arc;
 

@@ -113,7 +113,7 @@ struct Dressing<'d> {
     materials: &'d Materials,
     of_face: Vec<u32>,
     uv: Vec<CornerUv>,
-    /// What is wrong with texture coordinates.
+    /// Faults of texture coordinates.
     unread: Vec<String>,
 }
 

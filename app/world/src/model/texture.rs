@@ -44,7 +44,7 @@ impl std::fmt::Debug for Texture {
     }
 }
 
-/// What may be there.
+/// Pictures that may be there, for messages.
 pub(super) const ALLOWED: &str = "a PNG or JPEG file of at most 67 million places, 16384 on a side";
 /// Columns, or rows, of a picture that is read at most.
 const MOST_SIDE: usize = 16_384;
@@ -52,14 +52,14 @@ const MOST_SIDE: usize = 16_384;
 const MOST_TEXELS: usize = 1 << 26;
 /// Columns, or rows, that are kept at most.
 const MOST_SIDE_KEPT: u32 = 4096;
-/// What a decoder may take for itself.
+/// Bytes that a decoder may take for itself.
 const DECODER_BYTES: usize = 64 << 20;
 
 impl Texture {
     /// The picture in the bytes of a PNG or JPEG file; repeated beyond its edges.
     ///
     /// # Errors
-    /// What was found in place of one.
+    /// Words for that which was found in place of one.
     pub fn read(bytes: &[u8]) -> Result<Self, String> {
         let read = match bytes {
             [0x89, b'P', b'N', b'G', ..] => read_png,
@@ -119,7 +119,7 @@ impl Texture {
     }
 }
 
-/// What a file is that is no picture that can be read.
+/// Kind of a file that is no picture that can be read.
 fn kind(bytes: &[u8]) -> &'static str {
     let kinds: [(&[u8], _); 7] = [
         (b"RIFF", "a WebP file"),

@@ -27,7 +27,7 @@ pub(super) struct Materials {
 /// Of all pictures of a file together: half a gigabyte.
 const MOST_TEXELS: usize = 1 << 27;
 
-/// Where the bytes of an image are.
+/// Place of an image's bytes.
 #[derive(Clone, PartialEq, Eq)]
 enum Origin {
     Uri(String),
@@ -35,7 +35,7 @@ enum Origin {
     Nowhere,
 }
 
-/// What light does where a texture is not opaque.
+/// Way of light where a texture is not opaque.
 #[derive(Clone, Copy, PartialEq)]
 enum Mode {
     Opaque,
@@ -47,7 +47,7 @@ enum Mode {
 /// A texture, or none if it could not be read, and what it was made of.
 type Known = (Origin, [Wrap; 2], Mode, Option<Arc<Texture>>);
 
-/// Which texture coordinates, and what is done to them.
+/// Number of the texture coordinates, and what is done to them.
 #[derive(Clone, Copy)]
 pub(super) struct Lie {
     pub(super) set: usize,
