@@ -162,6 +162,26 @@ fn a_fault_is_not_left_because_somebody_asked_long_ago() {
     assert_eq!(clear.status, Some(0), "{clear:?}");
 }
 
+/// A command is short of memory just when it is answered.
+#[test]
+fn a_request_whose_answer_is_lost_may_have_been_done_and_is_told_so() {
+    let driver = Driver::start(&resting("real", 1));
+    let stop = asked(&driver, "emergency-stop");
+    assert_eq!(stop.status, Some(0), "{stop:?}");
+    let mut clear = Command::new("strace");
+    // The first answer gives a place to look from.
+    clear.args(["-o", "/dev/null", "-e", "trace=recvmsg", "-e", "inject=recvmsg:error=ENOMEM:when=2"]);
+    clear.arg(io_driver().get_program()).args(["clear-fault", "--socket"]).arg(driver.socket());
+    if !Command::new("strace").args(["-o", "/dev/null", "true"]).bounded_status().is_ok_and(|s| s.success()) {
+        return eprintln!("skipped: there is no strace that may trace here");
+    }
+    let clear = Running::start(&mut clear).end();
+    assert_eq!(clear.status, Some(3), "{clear:?}");
+    assert!(clear.err.contains("may have heard it, but its answer cannot be read"), "{clear:?}");
+    let observer = driver.observe();
+    wait_for(|| observer.driver.read_latest().filter(|frame| frame.fault == FaultReason::None as u64));
+}
+
 #[test]
 fn a_run_at_a_driver_in_its_fault_state_names_the_fault_and_the_command_that_leaves_it() {
     let driver = Driver::start(&resting("real", 1));
