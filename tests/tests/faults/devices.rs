@@ -144,7 +144,9 @@ fn a_failing_device(clock: &str, mood: Mood, reason: FaultReason) {
     let end = clearing.bounded_join().expect("no panic");
     assert_eq!(end.status, Some(0), "{end:?}");
     check_ramp(&stage.log.told);
-    assert_eq!(read_latest(&stage.view).state, DriverState::Active as u64);
+    // On a busy machine the commander may be late in the latest frame.
+    let whole = stage.log.told.iter().find(|told| is_whole(told)).expect("just seen");
+    assert_eq!(whole.state, DriverState::Active);
     assert!(observer.connection.is_open());
     drop(stage.commander);
 }
