@@ -14,6 +14,7 @@ mod suspicions;
 mod together;
 mod warnings;
 
+use crate::loading::while_reading;
 use crate::outputs;
 use crate::rig::{HandMode, Problems, Rig};
 use crate::settings;
@@ -144,7 +145,9 @@ fn check(args: &CheckArgs, settings: &Settings) -> Checked {
     let hand = args.hand.as_ref().map(|hand| settings::find(hand, &settings.hands.value));
     let (hand, period_ns) = (hand.as_deref(), period_of(args.rate_hz));
     let whole = scene.clone();
-    let rig = Rig::examine(&file, scene, layout, hand, HandMode::Kinematic, period_ns, &mut problems);
+    let rig = while_reading(&file, || {
+        Rig::examine(&file, scene, layout, hand, HandMode::Kinematic, period_ns, &mut problems)
+    });
     checked.problems.extend(problems.all().iter().map(|error| Problem::new(error, error.location())));
     let Some((rig, step)) = rig.and_then(|rig| rig.fast_step().ok().map(|step| (rig, step))) else {
         return checked;

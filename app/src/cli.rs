@@ -118,9 +118,10 @@ pub fn main() -> ExitCode {
 fn execute() -> ExitCode {
     let Cli { settings, command, headless } = arguments::parse_with(advise);
     if settings.is_said() && !obeys_settings(command.as_ref()) {
-        return failed(&RunFailure::Start(
+        return RunFailure::Start(
             "--set, --settings: for run, play, check SCENE, replay and settings alone; this command goes by none".into(),
-        ));
+        )
+        .conclude();
     }
     match command {
         Some(AppCommand::Driver(command)) => io_driver::cli::execute(command),
@@ -134,7 +135,7 @@ fn execute() -> ExitCode {
                 settings::print(&settings);
                 ExitCode::SUCCESS
             }
-            Err(failure) => failed(&failure),
+            Err(failure) => failure.conclude(),
         },
         Some(AppCommand::Run(args)) => {
             conclude(settings.load().and_then(|settings| run_scene(&args, &settings, headless)))
@@ -144,22 +145,22 @@ fn execute() -> ExitCode {
         }
         Some(AppCommand::Check(args)) if args.is_model() => {
             let result = install_signals().and_then(interrupted::watch);
-            result.map_or_else(|failure| failed(&failure), |()| check::model_file::execute(&args))
+            result.map_or_else(|failure| failure.conclude(), |()| check::model_file::execute(&args))
         }
         Some(AppCommand::Check(args)) => settings
             .load()
-            .map_or_else(|failure| failed(&failure), |settings| check::execute(&args, &settings)),
+            .map_or_else(|failure| failure.conclude(), |settings| check::execute(&args, &settings)),
         Some(AppCommand::Convert(args)) => conclude_or_take_back(|| convert::execute(&args)),
         Some(AppCommand::Replay(args)) => {
             let ready = settings.load().and_then(|settings| Ok((settings, install_signals()?)));
             let result = ready.and_then(|(settings, signals)| replay::execute(&args, &settings, &signals));
-            result.unwrap_or_else(|failure| failed(&failure))
+            result.unwrap_or_else(|failure| failure.conclude())
         }
         Some(AppCommand::Export(args)) => conclude_or_take_back(|| export::execute(&args)),
         Some(AppCommand::Plot(args)) => conclude_or_take_back(|| picture::execute(&args)),
         Some(AppCommand::Study(command)) => {
             let result = install_signals().and_then(|signals| study::execute(&command, &signals));
-            result.map_or_else(|failure| failed(&failure), Stop::conclude)
+            result.map_or_else(|failure| failure.conclude(), Stop::conclude)
         }
         None => conclude(settings.load().and_then(|settings| play_or_demo(&settings, headless))),
     }
@@ -215,8 +216,8 @@ fn play(args: &PlayArgs, settings: &Settings, is_headless: bool) -> Result<(Repo
                 .into(),
         ));
     }
-    let signals = install_signals()?;
     let rig = args.rig(settings)?;
+    let signals = install_signals()?;
     let mut plan = args.plan(&rig, settings)?;
     plan.window = window_spec(&rig.scene.name, settings)?;
     if plan.window.is_none() {
@@ -240,9 +241,10 @@ fn run_demo(settings: &Settings, is_headless: bool) -> Result<(Report, Stop), Ru
 }
 
 fn run_scene(args: &RunArgs, settings: &Settings, is_headless: bool) -> Result<(Report, Stop), RunFailure> {
-    let signals = install_signals()?;
     let args = &args.with(settings);
     let rig = make_rig(args, settings)?;
+    // Until here nothing is made, and a signal ends the program at once.
+    let signals = install_signals()?;
     let mut plan = make_plan(args, &rig, settings)?;
     plan.window = if is_headless { None } else { window_spec(&rig.scene.name, settings)? };
     for suspicion in check::suspicions_of_the_hand(&rig) {
@@ -275,7 +277,7 @@ fn window_spec(title: &str, settings: &Settings) -> Result<Option<WindowSpec>, R
 /// Of a command that a signal ends at once, without half a result.
 fn conclude_or_take_back(execute: impl FnOnce() -> Result<Stop, RunFailure>) -> ExitCode {
     let result = install_signals().and_then(interrupted::watch).and_then(|()| execute());
-    result.map_or_else(|failure| failed(&failure), Stop::conclude)
+    result.map_or_else(|failure| failure.conclude(), Stop::conclude)
 }
 
 fn install_signals() -> Result<StopSignals, RunFailure> {
@@ -289,13 +291,8 @@ fn conclude(result: Result<(Report, Stop), RunFailure>) -> ExitCode {
             let ended = stop.conclude();
             if report.lacks_a_recording() { ExitCode::from(EXIT_FAULT) } else { ended }
         }
-        Err(failure) => failed(&failure),
+        Err(failure) => failure.conclude(),
     }
-}
-
-fn failed(failure: &RunFailure) -> ExitCode {
-    say(format_args!("phantom3: {failure}"));
-    ExitCode::from(failure.exit_status())
 }
 
 // The exit status of a usage error is clap's own, which is the contract's.

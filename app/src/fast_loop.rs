@@ -196,6 +196,7 @@ impl FastLoop {
     pub fn answer_read(&mut self, driver: &DriverView, commander: &CommanderMemory) -> Turn {
         self.complete_pending(driver);
         if self.frame.state == DriverState::Fault as u64 {
+            self.tell_fault();
             return Turn::Fault(self.frame.fault);
         }
         if self.frame.lease != commander.lease() {
@@ -204,6 +205,13 @@ impl FastLoop {
         self.answer(commander, driver);
         self.keep_row();
         if self.is_finished() { Turn::Finished } else { Turn::Answered }
+    }
+
+    /// In the tick after the last row.
+    fn tell_fault(&mut self) {
+        if let Some(events) = &mut self.events {
+            events.send(Event { run_tick: self.next_tick, kind: Kind::Fault { reason: self.frame.fault } });
+        }
     }
 
     /// Answers a frame after the run's last row: with the same forces, and nothing that anybody keeps. False when the

@@ -30,6 +30,7 @@ pub mod fast_thread;
 mod interrupted;
 pub mod lists_end;
 pub mod live;
+mod loading;
 pub mod moments;
 pub mod mount;
 mod not_zeroed;

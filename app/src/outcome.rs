@@ -1,5 +1,6 @@
 //! How a run can end.
 
+use crate::fast_loop::Tally;
 use crate::not_zeroed;
 use crate::plausible::Implausible;
 use crate::recording::RecordingError;
@@ -14,8 +15,8 @@ use std::process::ExitCode;
 use thiserror::Error;
 use view::NoWindow;
 
-/// Why a run stopped without anything being wrong.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+/// Why something that was begun has come to its end.
+#[derive(Debug)]
 pub enum Stop {
     /// It is over.
     Finished,
@@ -23,14 +24,32 @@ pub enum Stop {
     Closed,
     /// This signal asked for it.
     Signal(i32),
+    /// It could not go on.
+    Failed(RunFailure),
 }
 
 impl Stop {
-    /// Tells that a signal asked for it; returns the exit status, which then is 128 and the signal's number.
+    /// The same, of a run; one that failed before it answered a tick has nothing to report.
+    ///
+    /// # Errors
+    /// That failure.
+    pub fn of_run(self, tally: &Tally) -> Result<Self, RunFailure> {
+        match self {
+            Self::Failed(failure) if tally.answered == 0 => Err(failure),
+            other => Ok(other),
+        }
+    }
+
+    /// Tells a signal or a failure; returns the exit status, which after a signal is 128 and its number.
     pub fn conclude(self) -> ExitCode {
-        let Self::Signal(signal) = self else { return ExitCode::SUCCESS };
-        say(format_args!("phantom3: ended by signal {signal} before its time"));
-        ExitCode::from(128u8.saturating_add(u8::try_from(signal).unwrap_or(0)))
+        match self {
+            Self::Finished | Self::Closed => ExitCode::SUCCESS,
+            Self::Signal(signal) => {
+                say(format_args!("phantom3: ended by signal {signal} before its time"));
+                ExitCode::from(128u8.saturating_add(u8::try_from(signal).unwrap_or(0)))
+            }
+            Self::Failed(failure) => failure.conclude(),
+        }
     }
 }
 
@@ -113,6 +132,12 @@ impl RunFailure {
     /// The same of a driver that somebody runs at this socket: it goes on, and its fault stays.
     pub fn driver_fault_at(word: u64, socket: &Path) -> Self {
         Self::RunningDriverFault { why: FaultReason::sentence_for(word), place: not_zeroed::place(socket) }
+    }
+
+    /// Tells it; returns the exit status.
+    pub fn conclude(&self) -> ExitCode {
+        say(format_args!("phantom3: {self}"));
+        ExitCode::from(self.exit_status())
     }
 
     /// The exit status of the run contract: 2 nothing was started, 3 a fault during the run.

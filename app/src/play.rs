@@ -3,6 +3,7 @@
 mod free_place;
 mod starts;
 
+use crate::loading::while_reading;
 use crate::outcome::RunFailure;
 use crate::rig::{HandMode, Rig};
 use crate::settings;
@@ -34,7 +35,8 @@ pub fn rig(scene: Option<&Path>, settings: &Settings, period_ns: u64) -> Result<
     // Nothing follows a script.
     scene.hand = None;
     settings::find_data(&mut scene, &file, settings);
-    let rig = Rig::new(&file, scene, None, None, HandMode::Impedance(devices()), period_ns)
+    let hand_mode = HandMode::Impedance(devices());
+    let rig = while_reading(&file, || Rig::new(&file, scene, None, None, hand_mode, period_ns))
         .map_err(|error| wrong(&error))?;
     let (starts, told) = starts::starts(&rig).map_err(|error| wrong(&error))?;
     if !told.is_empty() {

@@ -243,10 +243,10 @@ fn run_virtual(rig: &Rig, plan: &RunPlan, signals: &StopSignals) -> Result<(Repo
     let about = About::of_run(rig, ClockMode::Virtual, rig.period_ns, plan.seed);
     let Parts { mut fast, mut slow, mut progress, .. } =
         Parts::new(rig, plan, ClockMode::Virtual, rig.period_ns, &driver.extras(), &about, None)?;
-    let result = driver.run(&mut fast, &mut slow, &mut progress, signals);
+    let stop = driver.run(&mut fast, &mut slow, &mut progress, signals);
     progress.end();
     let SlowEnd { recordings, events, pictures } = slow.finish();
-    let stop = result.inspect_err(|_| tell_kept(&recordings))?;
+    let stop = stop.of_run(&fast.tally).inspect_err(|_| tell_kept(&recordings))?;
     let report = Report {
         clock: ClockMode::Virtual.name(),
         period_ns: rig.period_ns,
@@ -303,6 +303,7 @@ fn run_two_processes(rig: &Rig, plan: &RunPlan, signals: &StopSignals) -> Result
     }
     let SlowEnd { recordings, events, pictures } = slow.finish();
     let end = result.inspect_err(|_| tell_kept(&recordings))?;
+    let stop = end.stop.of_run(&end.tally).inspect_err(|_| tell_kept(&recordings))?;
     let is_real = info.clock_mode == ClockMode::Real;
     let report = Report {
         clock: info.clock_mode.name(),
@@ -320,7 +321,7 @@ fn run_two_processes(rig: &Rig, plan: &RunPlan, signals: &StopSignals) -> Result
         recordings,
         pictures,
     };
-    Ok((report, end.stop))
+    Ok((report, stop))
 }
 
 /// Inputs of the run that a recording which is to have all of them lacks.
@@ -331,7 +332,7 @@ fn left_out(plan: &RunPlan, about: &About) -> Vec<String> {
     about.left_out().map(|(input, why)| format!("{input}: {why}")).collect()
 }
 
-/// There is no report of a run that a fault ended, but what it recorded is there.
+/// There is no report of a run that failed before its first tick, but what it was to record is named.
 fn tell_kept(recordings: &[Recorded]) {
     for recorded in recordings {
         say(format_args!("{}", recording_line(recorded, 0)));

@@ -6,6 +6,7 @@
 use crate::outcome::RunFailure;
 use crate::outputs::tell;
 use clap::Args;
+use std::borrow::Cow;
 use std::io;
 use std::path::{Path, PathBuf};
 use world::{MeshSpec, Scene, SceneError, Settings, ShapeSpec};
@@ -44,10 +45,23 @@ impl SettingsArgs {
                 with_file => with_file.map_err(wrong)?,
             };
         }
-        self.set
-            .iter()
-            .try_fold(settings, |settings, set| settings.overlaid(set, Path::new("--set")).map_err(wrong))
+        self.set.iter().try_fold(settings, |settings, set| {
+            settings.overlaid(&with_quotes(set), Path::new("--set")).map_err(wrong)
+        })
     }
+}
+
+/// The setting with quotes around a text, which a shell has taken away.
+fn with_quotes(set: &str) -> Cow<'_, str> {
+    let Some((key, value)) = set.split_once('=') else { return set.into() };
+    let text = value.trim();
+    let begins_as_text = text.starts_with(|c: char| c.is_alphabetic() || matches!(c, '/' | '.' | '~'));
+    let is_plain = !text.contains(['"', '\'', '\\', '#']) && !text.contains(char::is_control);
+    let is_word = ["true", "false", "yes", "no", "on", "off"].contains(&text.to_lowercase().as_str());
+    if !begins_as_text || !is_plain || is_word || text.parse::<f64>().is_ok() {
+        return set.into();
+    }
+    format!("{key}=\"{text}\"").into()
 }
 
 /// Whether there is no such file, as far as may be seen; a part of its path may be none either.
@@ -156,6 +170,12 @@ mod tests {
         let settings = args.load().expect("built in, at least");
         assert!(!settings.shadows.value);
         assert_eq!(settings.shadows.from.to_string(), "--set:1");
+        // As `--set driver.socket="/run/a b.sock"` arrives from a shell.
+        let args = SettingsArgs { set: vec!["driver.socket=/run/a b.sock".into()], ..args };
+        let socket = args.load().expect("a text").driver_socket.value;
+        assert_eq!(socket.as_deref(), Some(Path::new("/run/a b.sock")));
+        let args = SettingsArgs { set: vec!["window.shadows=True".into()], ..args };
+        assert!(args.load().expect_err("no TOML").to_string().ends_with("allowed: true, in small letters"));
         let args = SettingsArgs { set: vec!["window.shadow=false".into()], ..args };
         let said = args.load().expect_err("no such key").to_string();
         assert!(said.starts_with("--set:1: window.shadow: unknown key (did you mean `shadows`?)"), "{said}");

@@ -99,7 +99,7 @@ pub fn describe(source: &Source, attachment: &Attachment) -> String {
 /// Runs to the end.
 ///
 /// # Errors
-/// If the driver cannot be attached to, faults, goes away for good or comes back as another one.
+/// If the fast thread could not do its work.
 pub fn run(
     source: &mut Source,
     attachment: Attachment,
@@ -129,21 +129,26 @@ pub fn run(
             WatchEnd::Fast(FastEnd::Finished) => Stop::Finished,
             WatchEnd::Signal(signal) | WatchEnd::Fast(FastEnd::Signal(signal)) => Stop::Signal(signal),
             WatchEnd::Closed => Stop::Closed,
-            WatchEnd::Fast(FastEnd::Fault(reason)) => return Err(source.fault(reason)),
-            WatchEnd::Fast(FastEnd::Implausible(lie)) => return Err(RunFailure::DriverImplausible(lie)),
-            WatchEnd::Fast(FastEnd::Silent) => return Err(RunFailure::DriverSilent { seconds: 5.0 }),
+            WatchEnd::Fast(FastEnd::Fault(reason)) => Stop::Failed(source.fault(reason)),
+            WatchEnd::Fast(FastEnd::Implausible(lie)) => Stop::Failed(RunFailure::DriverImplausible(lie)),
+            WatchEnd::Fast(FastEnd::Silent) => Stop::Failed(RunFailure::DriverSilent { seconds: 5.0 }),
+            WatchEnd::DriverGone | WatchEnd::Fast(FastEnd::Stopped) if goes_on(&remains.driver) => {
+                Stop::Failed(RunFailure::LeaseEnded)
+            }
             WatchEnd::DriverGone | WatchEnd::Fast(FastEnd::Stopped) => {
-                if goes_on(&remains.driver) {
-                    return Err(RunFailure::LeaseEnded);
-                }
                 let words = last_words(&remains.driver);
                 drop(connection);
                 progress.end();
-                attachment = reattach(source, (premises, &remains.driver), &words, signals)?;
-                totals.go_on(&attachment.driver, describe(source, &attachment));
-                fast = remains.fast;
-                fast.reset();
-                continue;
+                match reattach(source, (premises, &remains.driver), &words, signals) {
+                    Ok(again) => {
+                        totals.go_on(&again.driver, describe(source, &again));
+                        attachment = again;
+                        fast = remains.fast;
+                        fast.reset();
+                        continue;
+                    }
+                    Err(failure) => Stop::Failed(failure),
+                }
             }
         };
         let FastRemains { driver, mut fast, .. } = remains;

@@ -70,35 +70,32 @@ impl VirtualDriver {
     }
 
     /// Runs to the end.
-    ///
-    /// # Errors
-    /// A fault.
     pub fn run(
         &mut self,
         fast: &mut FastLoop,
         slow: &mut SlowSide,
         progress: &mut Progress,
         signals: &StopSignals,
-    ) -> Result<Stop, RunFailure> {
+    ) -> Stop {
         for tick in 1.. {
             let turn = self.tick(tick, fast);
             if tick % SLOW_EVERY == 0 {
                 slow.step();
                 progress.show(fast.run_ticks());
                 if slow.wants_end() {
-                    return Ok(Stop::Closed);
+                    return Stop::Closed;
                 }
             }
             match turn {
                 Turn::Finished => break,
-                Turn::Fault(reason) => return Err(RunFailure::driver_fault(reason)),
+                Turn::Fault(reason) => return Stop::Failed(RunFailure::driver_fault(reason)),
                 Turn::Answered | Turn::Skipped | Turn::Unread => {}
             }
             if let Some(signal) = signals.requested() {
-                return Ok(Stop::Signal(signal));
+                return Stop::Signal(signal);
             }
         }
-        Ok(Stop::Finished)
+        Stop::Finished
     }
 
     /// The driver reads and tells, the application answers, the driver writes; or, where replies are for the next

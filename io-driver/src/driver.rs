@@ -21,7 +21,7 @@ use crate::stop_thread;
 use crate::supervisor::Supervisor;
 use rt_core::epitaph::{install_fatal_handlers, install_panic_hook};
 use rt_core::privileges::{User, UserError};
-use rt_core::setup::SetupReport;
+use rt_core::setup::{PromotedChildren, SetupReport};
 use rt_core::signals::StopSignals;
 use shm_abi::DriverMemory;
 use shm_abi::doorbell::WaitMode;
@@ -160,6 +160,10 @@ pub fn run(config: &DriverConfig, options: &RunOptions) -> Result<(), RunError> 
     // The usual places may be made without a word; a name that is mistyped is told by what it makes.
     let missing = named.as_deref().and_then(missing_directory);
     let path = named.unwrap_or_else(shm_abi::endpoint::for_driver);
+    // Programs of real time that fill all CPUs keep no stop waiting: its threads are next below the loop. They start late,
+    // when the right to this is given up.
+    let below = |priority: u8| PromotedChildren::begin(priority.saturating_sub(1).max(1));
+    let promoted = config.real_time.priority.map(below);
     give_up_rights(user.as_ref(), &path, &mut report, &starter)?;
     if user.is_some() {
         // The kernel forgets the request when the user changes.
@@ -177,8 +181,9 @@ pub fn run(config: &DriverConfig, options: &RunOptions) -> Result<(), RunError> 
     // The last threads: the sandbox lets none be started.
     let no_thread = |what| move |source| RunError::NoThread { what, source };
     let (stop_socket, stop_file) = StopSocket::bind(server.path())?;
-    stop_thread::start(stop_socket, sender.urgent.clone(), options.quiet, config.real_time.priority)
+    stop_thread::start(stop_socket, sender.urgent.clone(), options.quiet)
         .map_err(no_thread("listen for stops"))?;
+    drop(promoted);
     let lost = drain.lost_count();
     log_thread::start_for_driver(drain, options.quiet).map_err(no_thread("start the log"))?;
     refuse_without_descriptors()?;

@@ -26,26 +26,16 @@ const TAKEN_WITHIN: Duration = Duration::from_millis(5);
 /// A receive, a line of the log and a handler of signals.
 const STACK_BYTES: usize = 64 * 1024;
 
-/// Starts them; from now on all other threads leave signals to the first. Beside a loop of a real-time priority it has the
-/// next lower one, if the limits allow it (RLIMIT_RTPRIO): programs of real time that fill all CPUs keep no stop waiting. What
-/// capabilities allow is given up before it starts.
+/// Starts them; from now on all other threads leave signals to the first.
 ///
 /// # Errors
 /// What the system says to other threads, or to their signals.
-pub(crate) fn start(
-    socket: StopSocket,
-    urgent: Urgent,
-    is_quiet: bool,
-    loop_priority: Option<u8>,
-) -> io::Result<()> {
+pub(crate) fn start(socket: StopSocket, urgent: Urgent, is_quiet: bool) -> io::Result<()> {
     signals::block_in_this_thread()?;
     let queue = Queue::start(socket.drain()?)?;
     let (tell_begun, begun) = sync_channel(1);
     let thread = std::thread::Builder::new().name("stop".into()).stack_size(STACK_BYTES);
     thread.spawn(move || {
-        if let Some(priority) = loop_priority {
-            rt_core::setup::promote(priority.saturating_sub(1).max(1));
-        }
         let receives = signals::receive_in_this_thread();
         let is_ready = receives.is_ok();
         let _ = tell_begun.send(receives);

@@ -169,7 +169,7 @@ impl<'a> TableReader<'a> {
     pub fn open(text: &'a str, file: &'a Path) -> Result<Self, TableError> {
         let text = text.strip_prefix('\u{feff}').unwrap_or(text).trim_end();
         let (first, rows) = text.split_once('\n').unwrap_or((text, ""));
-        let reader = Self { file, header: first.split(',').map(str::trim).collect(), rows };
+        let reader = Self { file, header: cells(first).collect(), rows };
         reader.check_header(text.is_empty())?;
         Ok(reader)
     }
@@ -243,7 +243,7 @@ impl<'a> TableReader<'a> {
         if row.trim().is_empty() {
             return Err(self.row_length(line, row));
         }
-        let mut cells = row.split(',').map(str::trim);
+        let mut cells = cells(row);
         for (index, &name) in self.header.iter().enumerate() {
             let cell = cells.next().ok_or_else(|| self.row_length(line, row))?;
             if index == 0 {
@@ -303,6 +303,10 @@ impl Display for Cells {
     }
 }
 
+fn cells(line: &str) -> impl Iterator<Item = &str> {
+    line.split(',').map(|cell| separators::unquoted(cell).trim())
+}
+
 fn quote(cell: &str) -> String {
     if cell.is_empty() { "nothing".to_owned() } else { format!("`{}`", clip(cell)) }
 }
@@ -339,9 +343,12 @@ mod tests {
     #[test]
     fn spreadsheet_dialects_read_the_same() {
         let plain = read("t,x\n0,1\n1,2").unwrap();
-        for dialect in
-            ["\u{feff}t,x\r\n0,1\r\n1,2\r\n", " t , x \n 0 ,\t1\n1, +2.0 \n\n  \n", "t,x\n0,1\n1,2\r\n\r\n"]
-        {
+        for dialect in [
+            "\u{feff}t,x\r\n0,1\r\n1,2\r\n",
+            " t , x \n 0 ,\t1\n1, +2.0 \n\n  \n",
+            "t,x\n0,1\n1,2\r\n\r\n",
+            "\"t\", \"x\"\n0,\"1\"\n1,2",
+        ] {
             assert_eq!(read(dialect).unwrap(), plain, "{dialect:?}");
         }
     }

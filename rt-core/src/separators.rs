@@ -38,6 +38,23 @@ pub fn hint_for_row(line: &str, columns: usize) -> &'static str {
     }
 }
 
+/// A cell without the quotes that some programs, R's `write.csv` among them, put around it. One of text that has commas or
+/// quotes itself is none of ours, and stays as it is.
+pub fn unquoted(cell: &str) -> &str {
+    let trimmed = cell.trim();
+    let inner = trimmed.strip_prefix('"').and_then(|rest| rest.strip_suffix('"'));
+    inner.filter(|inner| !inner.contains('"')).unwrap_or(cell)
+}
+
+/// A line without quotes around its cells.
+pub fn unquoted_line(line: String) -> String {
+    if !line.contains('"') {
+        return line;
+    }
+    let cells: Vec<&str> = line.split(',').map(unquoted).collect();
+    cells.join(",")
+}
+
 /// What to say of a cell that is no number.
 pub fn hint_for_cell(cell: &str) -> &'static str {
     let is_comma = |point: char| point == ',';
@@ -66,6 +83,18 @@ mod tests {
         assert!(mistaken_ends("t,x\r0,1\r").is_some_and(|words| words.contains("carriage returns")));
         for good in ["", "t,x\r\n0,1\r\n", "t,x\n", "t", "t\r"] {
             assert_eq!(mistaken_ends(good), None, "{good:?}");
+        }
+    }
+
+    #[test]
+    fn quotes_around_a_cell_are_no_part_of_it() {
+        for (line, cells) in [
+            ("\"t\",\"f0_x\", \"f 1\" ", "t,f0_x,f 1"),
+            ("1,\"0.5\",\"\"", "1,0.5,"),
+            ("\"a,b\",c", "\"a,b\",c"),
+            ("\"say \"\"a\"\"\",\",x", "\"say \"\"a\"\"\",\",x"),
+        ] {
+            assert_eq!(unquoted_line(line.into()), cells);
         }
     }
 

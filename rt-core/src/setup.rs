@@ -22,6 +22,7 @@ mod report;
 pub(crate) mod scheduling;
 
 pub use report::{Guarantee, SetupReport};
+pub use scheduling::PromotedChildren;
 
 use std::fs::File;
 
@@ -61,13 +62,6 @@ impl SetupGuards {
     pub fn holds_dma_latency(&self) -> bool {
         self.dma_latency.is_some()
     }
-}
-
-/// Gives the calling thread a priority before those of ordinary threads, if the system lets it have one: for a thread beside a
-/// loop that sleeps nearly always, and must not be starved by others when it is needed.
-pub fn promote(priority: u8) {
-    // A loop that gets no real time itself has told so.
-    let _ = scheduling::promote(priority);
 }
 
 /// Does what `request` asks for to the calling thread and its process, and reports what is in force.

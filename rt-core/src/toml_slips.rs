@@ -13,6 +13,8 @@ pub fn explain(text: &str, offset: usize, said: &str) -> String {
     let rest = rest.split(['\n', '\r']).next().unwrap_or_default();
     word_without_quotes(before, rest)
         .or_else(|| number_with_unit(before, rest))
+        .or_else(|| typographic_minus(before, rest))
+        .or_else(|| expression(before, rest))
         .or_else(|| half_a_number(before, rest).map(str::to_owned))
         .or_else(|| backslash(before, &said).map(str::to_owned))
         .or_else(|| typographic_quotes(before, rest, &said).map(str::to_owned))
@@ -59,6 +61,28 @@ fn number_with_unit(before: &str, rest: &str) -> Option<String> {
     let value = rest.split([',', ']', '}', '#']).next().unwrap_or_default().trim_end();
     let is_one = is_value && value.chars().count() <= MOST_CHARS && has_unit(value);
     is_one.then(|| format!("found {value}, allowed: a number alone; {NO_UNITS}"))
+}
+
+/// Value in which the parser stopped, from its beginning to its end.
+fn value_around(before: &str, rest: &str) -> Option<String> {
+    let (_, begun) = before.rsplit_once(['=', '[', ','])?;
+    let ends = [',', ']', '}', '#'];
+    Some([begun, rest.split(ends).next().unwrap_or_default()].concat().trim().to_owned())
+}
+
+/// A minus as word processors and journals write it.
+fn typographic_minus(before: &str, rest: &str) -> Option<String> {
+    let value = value_around(before, rest)?;
+    let number = value.strip_prefix(['\u{2212}', '\u{2010}', '\u{2011}', '\u{2013}', '\u{2014}'])?;
+    is_number(number).then(|| format!("found {value}, whose minus is a typographic one; allowed: -{number}"))
+}
+
+/// `1/3`, `2 * 0.05`
+fn expression(before: &str, rest: &str) -> Option<String> {
+    let value = value_around(before, rest)?;
+    let (left, right) = value.split_once(['/', '*'])?;
+    let both = is_number(left.trim()) && is_number(right.trim());
+    both.then(|| format!("found {value}, allowed: a number that is worked out, as in 0.333"))
 }
 
 /// Words for a text in quotes where a number is expected.
@@ -188,6 +212,27 @@ mod tests {
         assert_eq!(hint_for_text("500"), "; a number stands without quotes");
         for text in ["", "two", "N 5", "nan", "2024-01-01", "1 2", "5 apples and a pear!"] {
             assert_eq!(hint_for_text(text), "", "{text}");
+        }
+    }
+
+    #[test]
+    fn numbers_as_they_are_printed_and_sums_are_told_with_what_to_write() {
+        let string = "string values must be quoted, expected literal string";
+        for (value, number) in [("\u{2212}0.5", "0.5"), ("\u{2013}1e3", "1e3")] {
+            let said = at(&format!("x = {value} # left"), value, string);
+            assert!(said.ends_with(&format!("typographic one; allowed: -{number}")), "{said}");
+        }
+        for (text, place, found) in
+            [("x = 1/3", 5, "1/3"), ("x = [1, 2 * 0.5]", 10, "2 * 0.5"), ("x = {y = 1/2}", 10, "1/2")]
+        {
+            let said = explain(text, place, "unexpected key or value");
+            assert!(
+                said.starts_with(&format!("found {found}, allowed: a number that is worked out")),
+                "{said}"
+            );
+        }
+        for other in ["x = 1/a", "x = ./3", "x = \u{2212}", "x = \u{2212}y", "1/3"] {
+            assert_eq!(explain(other, other.len(), string), string, "{other}");
         }
     }
 

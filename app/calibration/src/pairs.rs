@@ -85,12 +85,10 @@ fn content(line: &str) -> &str {
 /// With commas or semicolons an empty cell is a mistake; white space alone may be of any width.
 fn cells(line: &str) -> impl Iterator<Item = &str> {
     let by_mark = line.contains([',', ';']);
-    let parts: Vec<&str> = if by_mark {
-        line.split([',', ';']).map(str::trim).collect()
-    } else {
-        line.split_whitespace().collect()
-    };
-    parts.into_iter()
+    let parts: Vec<&str> =
+        if by_mark { line.split([',', ';']).collect() } else { line.split_whitespace().collect() };
+    // Some programs quote each cell.
+    parts.into_iter().map(|part| part.trim().trim_matches('"').trim())
 }
 
 /// As a spreadsheet writes them where semicolons separate: then a comma is no separator.

@@ -5,6 +5,7 @@ use super::numbers::{parse_grace, parse_rate, parse_seconds, parse_seed};
 use super::run_help::RUN_HELP;
 use crate::calibrate::default_layout;
 use crate::control::desk::OrderSource;
+use crate::loading::while_reading;
 use crate::outcome::RunFailure;
 use crate::record::read::is_mcap;
 use crate::rig::{HandMode, Rig};
@@ -156,8 +157,10 @@ pub(super) fn make_rig(args: &RunArgs, settings: &Settings) -> Result<Rig, RunFa
     };
     let layout = find_layout(args)?;
     let period_ns = period_of(args.rate_hz.unwrap_or(DEFAULT_RATE_HZ));
-    let mut rig = Rig::new(&args.scene, scene, layout, args.hand.as_deref(), hand_mode, period_ns)
-        .map_err(|error| wrong(&error))?;
+    let hand = args.hand.as_deref();
+    let mut rig =
+        while_reading(&args.scene, || Rig::new(&args.scene, scene, layout, hand, hand_mode, period_ns))
+            .map_err(|error| wrong(&error))?;
     rig.scene.hand = rig.scene.hand.or(unread_hand);
     Ok(rig)
 }

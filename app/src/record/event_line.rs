@@ -4,6 +4,7 @@ use crate::book::Book;
 use crate::columns::Names;
 use io_driver::device::run_time_s;
 use serde_json::Value;
+use shm_abi::FaultReason;
 use world::events::{Event, Kind};
 
 /// The keys, in order; a table's header.
@@ -27,10 +28,11 @@ pub(super) const KEYS: [&str; 17] = [
     "to",
 ];
 
-/// What the number of an order or of a scene means, in words.
+/// What the number of an order, of a fault or of a scene means, in words.
 pub(super) fn said(event: &Event, book: &Book) -> Said {
     match event.kind {
         Kind::Order { number } => (book.order(number), None),
+        Kind::Fault { reason } => (FaultReason::sentence_for(reason).into_owned(), None),
         Kind::Scene { number } => {
             let scene = book.scene(number);
             (scene.as_ref().map_or_else(String::new, |(file, _)| file.clone()), scene)

@@ -1,6 +1,6 @@
 //! Which files a run is recorded in: those that were asked for, and beside each one of its own for every other scene.
 
-use super::destination::{Stream, is_same_place, is_standard_output};
+use super::destination::{Stream, is_same_place, is_standard_output, shown};
 use super::{
     About, Backpressure, Beginning, Opened, RecordFile, Recorder, View, begin_all, create, create_events,
     create_under_way,
@@ -39,8 +39,13 @@ impl Files {
     /// If one cannot be made.
     pub fn first(&self, rig: &Rig, view: &View) -> Result<Vec<Recorder>, RecordingError> {
         let paths: Vec<&PathBuf> = self.record.iter().chain(&self.events).collect();
-        let begun = begin_all(&paths, |number, file| self.begin(number, file, rig, view))?;
+        let begun = begin_all(&paths, |number, file| self.begin(number, file, rig, view))
+            .map_err(|error| if self.is_of_events(&error) { error.of_events() } else { error })?;
         Recorder::start_all(paths.into_iter().zip(begun), |path, file| self.start(path, file, rig))
+    }
+
+    fn is_of_events(&self, error: &RecordingError) -> bool {
+        self.events.iter().any(|file| shown(file) == error.file())
     }
 
     /// The file of this number, of those of rows and then of events.

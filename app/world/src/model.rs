@@ -67,7 +67,7 @@ pub enum ModelError {
     #[error("cannot be read: {0}")]
     Unreadable(#[source] io::Error),
     /// A directory, a pipe or a device.
-    #[error("{0}; name a model file")]
+    #[error("{0}; name a file")]
     NotAFile(#[source] io::Error),
     /// Larger than any model we build.
     #[error("larger than {limit_bytes} bytes; allowed: at most so many")]

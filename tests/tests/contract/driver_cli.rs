@@ -196,6 +196,7 @@ fn a_run_at_a_driver_in_its_fault_state_names_the_fault_and_the_command_that_lea
     for words in ["an emergency stop was pressed; the motors are off; find the cause, then", &command] {
         assert!(said.err.contains(words), "{words}: {}", said.err);
     }
+    assert_eq!(said.out, "", "there is nothing to report");
 }
 
 /// Clocks of time namespaces differ by as much as somebody says.

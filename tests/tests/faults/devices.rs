@@ -213,14 +213,15 @@ fn a_device_that_cannot_be_written_means_no_force_anywhere_until_somebody_clears
 }
 
 #[test]
-fn an_app_whose_driver_faults_says_why_and_its_recording_is_complete() {
+fn an_app_whose_driver_faults_says_why_with_its_report_and_what_it_wrote_is_complete() {
     for clock in ["real", "lockstep"] {
         let strings = [Strings::default()];
         let driver = hosted(clock, &strings);
         let view = client::observe(driver.socket(), "test").expect("an observer's place").driver;
         let table = Table::new();
         let mut app = table.app(clock);
-        app.args(["--seconds", "80000", "--record", "out.csv", "--attach"]).arg(driver.socket());
+        app.args(["--seconds", "80000", "--record", "out.csv", "--events", "out.jsonl", "--attach"]);
+        app.arg(driver.socket());
         let mut app = Running::start(&mut app);
         let runs = |frame: Frame| frame.run_tick > 100;
         wait_until(|| view.read_latest().is_some_and(runs));
@@ -229,7 +230,15 @@ fn an_app_whose_driver_faults_says_why_and_its_recording_is_complete() {
         assert_eq!(end.status, Some(3), "{end:?}");
         let message = "the driver is in its fault state: a device could not be read; the motors are off";
         assert!(end.err.contains(message), "{end:?}");
-        assert!(!recording::Table::read(&table.path("out.csv")).is_empty());
+        let rows = recording::Table::read(&table.path("out.csv")).len();
+        assert!(rows > 0);
+        let told = [format!("recording    out.csv ({rows} rows)"), "1 faults".into(), "ticks        ".into()];
+        assert!(told.iter().all(|words| end.out.contains(words)), "{end:?}");
+        let events = std::fs::read_to_string(table.path("out.jsonl")).expect("events");
+        let last: serde_json::Value =
+            serde_json::from_str(events.lines().last().expect("the fault")).expect("JSON");
+        assert_eq!((&last["kind"], &last["number"]), (&"fault".into(), &1.into()), "{last}");
+        assert_eq!(last["text"], "a device could not be read", "{last}");
         // The driver lives on, in its fault state.
         assert_eq!(read_latest(&view).state, DriverState::Fault as u64);
         assert_eq!(driver.stop(), Ended::Stopped);

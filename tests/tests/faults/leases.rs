@@ -194,6 +194,7 @@ fn a_run_whose_lease_somebody_ended_says_so_and_does_not_come_back() {
         let end = holder.end();
         assert_eq!(end.status, Some(3), "{end:?}");
         assert!(end.err.contains("somebody ended this run's lease"), "{end:?}");
+        assert!(end.out.contains("replies      "), "its report: {end:?}");
         log.follow(&press.observer.driver, "the end of the lease and of its force", |told| {
             told.last().is_some_and(|last| last.lease == 0 && !last.is_pushing())
         });

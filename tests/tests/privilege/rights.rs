@@ -120,6 +120,14 @@ fn policy_of(process: u32, name: &str) -> Option<[u64; 2]> {
     })
 }
 
+/// Ordinary threads wait for those of real time on all CPUs: the thread that takes stops is none, unlike the service.
+fn check_stops_are_real_time(driver: &Driver) {
+    let process = driver.child.id();
+    assert_eq!(policy_of(process, "stop"), Some([1, 1]));
+    let name = std::fs::read_to_string(format!("/proc/{process}/comm")).expect("it lives");
+    assert_eq!(policy_of(process, name.trim_end()), Some([0, 0]));
+}
+
 /// As after `setcap`, or with AmbientCapabilities= in a systemd unit.
 #[test]
 fn capabilities_give_real_time_and_are_given_up() {
@@ -135,6 +143,7 @@ fn capabilities_give_real_time_and_are_given_up() {
     let report = driver.observe().driver.info().setup_report;
     assert!(report.contains("obtained  scheduling: SCHED_FIFO 1"), "{report}");
     assert!(report.contains("obtained  memory locked: "), "{report}");
+    check_stops_are_real_time(&driver);
     assert!(threads_of(driver.child.id()).iter().all(|status| status["Uid"].starts_with("65534")));
     check_leases(&driver, 300);
 }
@@ -163,8 +172,7 @@ fn a_driver_that_never_had_a_capability_runs_by_its_limits() {
     if raises {
         assert!(report.contains("obtained  scheduling: SCHED_FIFO 1"), "{report}");
         assert!(report.contains("obtained  memory locked: "), "{report}");
-        // So has the thread that takes stops: ordinary ones wait for real time on all CPUs.
-        assert_eq!(policy_of(driver.child.id(), "stop"), Some([1, 1]));
+        check_stops_are_real_time(&driver);
     } else {
         println!(
             "skipped: this machine does not let root raise limits; it runs without real-time rights instead"
@@ -192,6 +200,7 @@ fn a_driver_started_by_root_becomes_the_user_that_it_is_told() {
     let report = driver.observe().driver.info().setup_report;
     assert!(report.contains("privileges: no capability, no new ones, user 65534\n"), "{report}");
     assert!(report.contains("obtained  memory locked: "), "{report}");
+    check_stops_are_real_time(&driver);
     let owner = |path: &Path| path.metadata().map(|meta| (meta.uid(), meta.gid())).expect("there");
     assert_eq!(owner(driver.socket()), (NOBODY, NOBODY));
     assert_eq!(owner(driver.socket().parent().expect("a directory")), (NOBODY, NOBODY));

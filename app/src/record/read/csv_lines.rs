@@ -75,10 +75,10 @@ impl CsvLines {
         }
         bytes.pop_if(|last| *last == b'\r');
         let text = String::from_utf8(bytes).map_err(|_| self.no_recording("it is no text".into()))?;
-        Ok(Some(match text.strip_prefix('\u{feff}').filter(|_| is_first) {
+        Ok(Some(separators::unquoted_line(match text.strip_prefix('\u{feff}').filter(|_| is_first) {
             Some(rest) => rest.to_owned(),
             None => text,
-        }))
+        })))
     }
 
     fn no_recording(&self, why: String) -> ReadError {

@@ -122,6 +122,11 @@ pub enum Kind {
         /// Which finger.
         finger: u32,
     },
+    /// The driver switched the motors off, which ends a run.
+    Fault {
+        /// Number of its fault in the shared-memory contract.
+        reason: u64,
+    },
     /// The scene was put back to its beginning. What touched before has ended.
     Reset,
     /// Another scene goes on in place of the one that was, whose contacts have ended. Numbers mean its fingers and entities
@@ -244,6 +249,8 @@ pub enum Class {
     Cut,
     /// [`Kind::Crowded`].
     Crowd,
+    /// [`Kind::Fault`].
+    Fault,
     /// [`Kind::Reset`] and [`Kind::Scene`].
     Reset,
     /// [`Kind::Order`].
@@ -254,7 +261,7 @@ pub enum Class {
 
 impl Class {
     /// All of them, with their words.
-    pub const ALL: [(Self, &str); 16] = [
+    pub const ALL: [(Self, &str); 17] = [
         (Self::Contact, "contacts"),
         (Self::Slip, "slips"),
         (Self::Pair, "pairs"),
@@ -268,6 +275,7 @@ impl Class {
         (Self::Door, "doors"),
         (Self::Cut, "cuts"),
         (Self::Crowd, "crowds"),
+        (Self::Fault, "faults"),
         (Self::Reset, "resets"),
         (Self::Order, "orders"),
         (Self::Lost, "lost"),
@@ -336,6 +344,7 @@ impl Kind {
             Self::Door { .. } => Class::Door,
             Self::Cut { .. } => Class::Cut,
             Self::Crowded { .. } => Class::Crowd,
+            Self::Fault { .. } => Class::Fault,
             Self::Reset | Self::Scene { .. } => Class::Reset,
             Self::Order { .. } => Class::Order,
             Self::Lost { .. } => Class::Lost,
@@ -409,6 +418,7 @@ impl Kind {
                 Facts { finger: Some(finger), entity, force_n: Some(force_n), ..of("cut") }
             }
             Self::Crowded { finger } => Facts { finger: Some(finger), ..of("crowded") },
+            Self::Fault { reason } => Facts { number: Some(reason), ..of("fault") },
             Self::Reset => of("reset"),
             Self::Scene { number } => Facts { number: Some(number.into()), ..of("scene") },
             Self::Order { number } => Facts { number: Some(number), ..of("order") },

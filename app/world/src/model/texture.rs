@@ -163,6 +163,10 @@ fn read_png(bytes: &[u8]) -> Result<Texture, String> {
 }
 
 fn read_jpeg(bytes: &[u8]) -> Result<Texture, String> {
+    // The decoder makes grey of what is missing.
+    if !has_jpeg_end(bytes) {
+        return Err("a JPEG file that is cut short".into());
+    }
     let options = DecoderOptions::default()
         .set_max_width(MOST_SIDE)
         .set_max_height(MOST_SIDE)
@@ -178,6 +182,12 @@ fn read_jpeg(bytes: &[u8]) -> Result<Texture, String> {
         _ => pixels.as_chunks().0.iter().map(|&[r, g, b]| [r, g, b, 255]).collect(),
     };
     Texture::new(size, texels)
+}
+
+/// Whether the marker of the end comes behind the last scan, in whose data no marker can be.
+fn has_jpeg_end(bytes: &[u8]) -> bool {
+    let last = |marker: [u8; 2]| bytes.windows(2).rposition(|pair| pair == marker);
+    last([0xff, 0xd9]) > last([0xff, 0xda])
 }
 
 #[cfg(test)]
@@ -254,7 +264,9 @@ mod tests {
             (&b""[..], "nothing"),
             (b"%PDF", "a file of another kind"),
             (b"RIFF....WEBP", "a WebP file"),
-            (&jpeg()[..40], "a damaged JPEG file"),
+            (&jpeg()[..40], "a JPEG file that is cut short"),
+            (&jpeg()[..jpeg().len() - 2], "a JPEG file that is cut short"),
+            (&[&jpeg()[..40], &[0xff, 0xd9]].concat(), "a damaged JPEG file"),
             (&whole[..whole.len() / 2], "a damaged PNG file"),
         ] {
             let said = Texture::read(bytes).unwrap_err();

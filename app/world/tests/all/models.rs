@@ -364,8 +364,8 @@ fn files_that_cannot_be_read_are_refused() {
     let directory = tempfile::tempdir().expect("a directory");
     let refused = |file: &Path| model::load(file).expect_err("it cannot be read").to_string();
     assert_eq!(refused(&directory.path().join("none.stl")), "no such file; name an existing one");
-    assert_eq!(refused(directory.path()), "it is a directory, no regular file; name a model file");
-    assert_eq!(refused(Path::new("/dev/zero")), "it is a device, no regular file; name a model file");
+    assert_eq!(refused(directory.path()), "it is a directory, no regular file; name a file");
+    assert_eq!(refused(Path::new("/dev/zero")), "it is a device, no regular file; name a file");
     // A file of holes: it takes no room on the disk, and is not read.
     let large = directory.path().join("large.stl");
     std::fs::File::create(&large).and_then(|file| file.set_len((1 << 30) + 1)).expect("a file of holes");

@@ -69,6 +69,19 @@ fn usual_slips_are_refused_with_what_to_write_and_not_with_what_the_parser_wante
             "name = \u{201c}table\u{201d}\n",
             "1:8: not valid TOML: found typographic quotes; text stands between straight ones, as in \"table\"",
         ),
+        (
+            "radius_m = \u{2212}0.5\n",
+            "1:12: not valid TOML: found \u{2212}0.5, whose minus is a typographic one; allowed: -0.5",
+        ),
+        (
+            "radius_m = 1/3\n",
+            "1:13: not valid TOML: found 1/3, allowed: a number that is worked out, as in 0.333",
+        ),
+        (
+            "radius_m = 0.3kg\n",
+            "1:12: not valid TOML: found 0.3kg, allowed: a number alone; numbers have no units, the name of the key tells \
+             the unit",
+        ),
     ] {
         refused(text, &format!("s.toml:{says}"));
     }
