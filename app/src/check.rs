@@ -23,6 +23,7 @@ use io_driver::arguments::shortened;
 use io_driver::config::period_of;
 use measures::Measures;
 use rt_core::plain_text::PlainJson;
+use rt_core::signals::StopSignals;
 use serde_json::{Value, json};
 use std::fmt::Display;
 use std::path::PathBuf;
@@ -145,7 +146,7 @@ fn check(args: &CheckArgs, settings: &Settings) -> Checked {
     let hand = args.hand.as_ref().map(|hand| settings::find(hand, &settings.hands.value));
     let (hand, period_ns) = (hand.as_deref(), period_of(args.rate_hz));
     let whole = scene.clone();
-    let rig = while_reading(&file, || {
+    let rig = while_reading(&file, &StopSignals::default(), || {
         Rig::examine(&file, scene, layout, hand, HandMode::Kinematic, period_ns, &mut problems)
     });
     checked.problems.extend(problems.all().iter().map(|error| Problem::new(error, error.location())));

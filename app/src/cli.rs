@@ -216,8 +216,8 @@ fn play(args: &PlayArgs, settings: &Settings, is_headless: bool) -> Result<(Repo
                 .into(),
         ));
     }
-    let rig = args.rig(settings)?;
     let signals = install_signals()?;
+    let rig = args.rig(settings, &signals)?;
     let mut plan = args.plan(&rig, settings)?;
     plan.window = window_spec(&rig.scene.name, settings)?;
     if plan.window.is_none() {
@@ -241,10 +241,9 @@ fn run_demo(settings: &Settings, is_headless: bool) -> Result<(Report, Stop), Ru
 }
 
 fn run_scene(args: &RunArgs, settings: &Settings, is_headless: bool) -> Result<(Report, Stop), RunFailure> {
-    let args = &args.with(settings);
-    let rig = make_rig(args, settings)?;
-    // Until here nothing is made, and a signal ends the program at once.
     let signals = install_signals()?;
+    let args = &args.with(settings);
+    let rig = make_rig(args, settings, &signals)?;
     let mut plan = make_plan(args, &rig, settings)?;
     plan.window = if is_headless { None } else { window_spec(&rig.scene.name, settings)? };
     for suspicion in check::suspicions_of_the_hand(&rig) {

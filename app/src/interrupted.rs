@@ -30,7 +30,8 @@ pub(crate) fn watch(signals: StopSignals) -> Result<(), RunFailure> {
     started.map(drop).map_err(|error| no_thread("to listen for signals", &error))
 }
 
-fn end(signal: i32) -> ! {
+/// Ends the process as one that this signal ended.
+pub(crate) fn end(signal: i32) -> ! {
     // Held to the end of the process: nothing takes its place any more.
     let (abandoned, _held) = abandon_all();
     for Abandoned { place, is_gone } in abandoned {

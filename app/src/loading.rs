@@ -1,7 +1,9 @@
-//! A line for whoever waits while models and textures are read.
+//! Reading of scenes, models and textures, which may take long: a line for whoever waits, and an ear for signals.
 
+use crate::interrupted;
 use crate::progress::StatusLine;
 use rt_core::plain_text::Plain;
+use rt_core::signals::StopSignals;
 use std::path::Path;
 use std::sync::mpsc::{RecvTimeoutError, sync_channel};
 use std::thread::ScopedJoinHandle;
@@ -9,20 +11,28 @@ use std::time::{Duration, Instant};
 
 /// Less is no waiting.
 const SOON: Duration = Duration::from_secs(1);
-const TURN: Duration = Duration::from_millis(200);
+/// Between two looks for a signal.
+const TURN: Duration = Duration::from_millis(20);
 
-/// Does this work, which reads a file and what it names; if that takes longer, a line says so.
-pub(crate) fn while_reading<T>(file: &Path, work: impl FnOnce() -> T) -> T {
+/// Does this work, which reads a file and what it names, and makes nothing. If that takes longer a line says so; a signal
+/// ends the program meanwhile.
+pub(crate) fn while_reading<T>(file: &Path, signals: &StopSignals, work: impl FnOnce() -> T) -> T {
     let begun = Instant::now();
     let (done, is_done) = sync_channel::<()>(0);
     std::thread::scope(|scope| {
         let tell = move || {
-            let mut pause = SOON;
             let mut line = StatusLine::default();
-            while is_done.recv_timeout(pause) == Err(RecvTimeoutError::Timeout) {
-                let seconds = begun.elapsed().as_secs();
-                line.show(|| format!("phantom3: reading {} ({seconds} s)", Plain(file.display())));
-                pause = TURN;
+            while is_done.recv_timeout(TURN) == Err(RecvTimeoutError::Timeout) {
+                if let Some(signal) = signals.requested() {
+                    line.end();
+                    interrupted::end(signal);
+                }
+                let elapsed = begun.elapsed();
+                if elapsed > SOON {
+                    line.show(|| {
+                        format!("phantom3: reading {} ({} s)", Plain(file.display()), elapsed.as_secs())
+                    });
+                }
             }
         };
         // Without a thread there is no line.

@@ -10,6 +10,7 @@ use crate::settings;
 use crate::simulated::SimulatedDevices;
 use io_driver::say::say;
 use io_driver::sim::hand::model_file::Firmness;
+use rt_core::signals::StopSignals;
 use std::path::Path;
 use world::{Scene, Settings};
 
@@ -20,7 +21,12 @@ const SCENE_NAME: &str = "config/scenes/play.toml (built in)";
 ///
 /// # Errors
 /// What is wrong with it.
-pub fn rig(scene: Option<&Path>, settings: &Settings, period_ns: u64) -> Result<Rig, RunFailure> {
+pub fn rig(
+    scene: Option<&Path>,
+    settings: &Settings,
+    period_ns: u64,
+    signals: &StopSignals,
+) -> Result<Rig, RunFailure> {
     let wrong = |error: &dyn std::fmt::Display| RunFailure::Start(error.to_string());
     let (file, mut scene) = match scene {
         Some(named) => {
@@ -36,7 +42,7 @@ pub fn rig(scene: Option<&Path>, settings: &Settings, period_ns: u64) -> Result<
     scene.hand = None;
     settings::find_data(&mut scene, &file, settings);
     let hand_mode = HandMode::Impedance(devices());
-    let rig = while_reading(&file, || Rig::new(&file, scene, None, None, hand_mode, period_ns))
+    let rig = while_reading(&file, signals, || Rig::new(&file, scene, None, None, hand_mode, period_ns))
         .map_err(|error| wrong(&error))?;
     let (starts, told) = starts::starts(&rig).map_err(|error| wrong(&error))?;
     if !told.is_empty() {

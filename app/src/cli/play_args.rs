@@ -8,6 +8,7 @@ use crate::rig::Rig;
 use crate::run::RunPlan;
 use clap::Args;
 use io_driver::config::period_of;
+use rt_core::signals::StopSignals;
 use shm_abi::segment::ClockMode;
 use std::path::PathBuf;
 use world::Settings;
@@ -28,8 +29,8 @@ pub(super) struct PlayArgs {
 }
 
 impl PlayArgs {
-    pub(super) fn rig(&self, settings: &Settings) -> Result<Rig, RunFailure> {
-        play::rig(self.scene.as_deref(), settings, period_of(DEFAULT_RATE_HZ))
+    pub(super) fn rig(&self, settings: &Settings, signals: &StopSignals) -> Result<Rig, RunFailure> {
+        play::rig(self.scene.as_deref(), settings, period_of(DEFAULT_RATE_HZ), signals)
     }
 
     /// # Errors

@@ -19,6 +19,7 @@ use io_driver::cli::usual_socket;
 use io_driver::config::period_of;
 use io_driver::say::say;
 use io_driver::sim::hand::model_file::Firmness;
+use rt_core::signals::StopSignals;
 use shm_abi::segment::ClockMode;
 use std::path::PathBuf;
 use std::time::Duration;
@@ -128,7 +129,11 @@ impl From<Clock> for ClockMode {
     }
 }
 
-pub(super) fn make_rig(args: &RunArgs, settings: &Settings) -> Result<Rig, RunFailure> {
+pub(super) fn make_rig(
+    args: &RunArgs,
+    settings: &Settings,
+    signals: &StopSignals,
+) -> Result<Rig, RunFailure> {
     let wrong = |error: &dyn std::fmt::Display| RunFailure::Start(error.to_string());
     if args.hand_mode == HandModeName::Impedance && args.attach.is_some() {
         return Err(wrong(
@@ -157,10 +162,8 @@ pub(super) fn make_rig(args: &RunArgs, settings: &Settings) -> Result<Rig, RunFa
     };
     let layout = find_layout(args)?;
     let period_ns = period_of(args.rate_hz.unwrap_or(DEFAULT_RATE_HZ));
-    let hand = args.hand.as_deref();
-    let mut rig =
-        while_reading(&args.scene, || Rig::new(&args.scene, scene, layout, hand, hand_mode, period_ns))
-            .map_err(|error| wrong(&error))?;
+    let make = || Rig::new(&args.scene, scene, layout, args.hand.as_deref(), hand_mode, period_ns);
+    let mut rig = while_reading(&args.scene, signals, make).map_err(|error| wrong(&error))?;
     rig.scene.hand = rig.scene.hand.or(unread_hand);
     Ok(rig)
 }
@@ -295,7 +298,9 @@ mod tests {
             let Some(AppCommand::Run(args)) = Cli::try_parse_from(words).expect("good words").command else {
                 panic!("not a run");
             };
-            let said = make_rig(&args, &Settings::default()).expect_err("kinematic").to_string();
+            let said = make_rig(&args, &Settings::default(), &StopSignals::default())
+                .expect_err("kinematic")
+                .to_string();
             assert!(said.starts_with(given[0]) && said.contains("--hand-mode impedance"), "{said}");
         }
     }
@@ -307,7 +312,9 @@ mod tests {
             let Some(AppCommand::Run(args)) = Cli::try_parse_from(words).expect("good words").command else {
                 panic!("not a run");
             };
-            let said = make_rig(&args, &Settings::default()).expect_err("no pictures").to_string();
+            let said = make_rig(&args, &Settings::default(), &StopSignals::default())
+                .expect_err("no pictures")
+                .to_string();
             assert!(said.starts_with(given[0]) && said.contains("--snapshot"), "{said}");
         }
         let said = Cli::try_parse_from(["phantom3", "run", "no-scene.toml", "--grace", "3"]).unwrap_err();

@@ -297,7 +297,7 @@ mod tests {
 
     #[test]
     fn columns_are_found_by_name_and_more_of_them_do_not_matter() {
-        let recorded = read(&format!("{HEADER}0.5,1,2,3,4,5,6,ball,x\n")).expect("a recording");
+        let recorded = read(&format!("{HEADER}\"0.5\",1,2,3,4,5,6,\"ball\",x\n")).expect("a recording");
         assert_eq!(recorded.times_s, [0.5]);
         let finger = &recorded.fingers[0];
         assert_eq!((finger.name.as_str(), finger.entities[0].as_str()), ("a", "ball"));
@@ -315,7 +315,7 @@ mod tests {
             (&*format!("{HEADER}0.1,1,2,3,four,5,6,,\n"), "r.csv:2: a_force_x is \"four\""),
             (&*format!("{HEADER}0,1,2\n"), "r.csv:2: found 3 cells, expected 9"),
             (&*format!("{HEADER}\n0,1,2,3,4,5,6,,\n"), "r.csv:2: found an empty line"),
-            (&*format!("{HEADER}\"0\",1,2,3,4,5,6,,\n"), "r.csv:2: t is \"\\\"0\\\"\"; allowed: a number"),
+            (&*format!("{HEADER}\"0,1,2,3,4,5,6,,\n"), "r.csv:2: t is \"\\\"0\"; allowed: a number"),
         ] {
             let error = read(text).expect_err("refused").to_string();
             assert!(error.contains(says), "{error}");

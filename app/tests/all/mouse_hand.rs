@@ -9,6 +9,7 @@ use phantom3::play;
 use phantom3::rig::Rig;
 use phantom3::row_queue::{RowReceiver, row_queue};
 use phantom3::virtual_clock::VirtualDriver;
+use rt_core::signals::StopSignals;
 use shm_abi::Frame;
 use shm_abi::segment::ClockMode;
 use std::f64::consts::PI;
@@ -48,7 +49,8 @@ struct Table {
 
 impl Table {
     fn new() -> Self {
-        let rig = play::rig(None, &Settings::default(), PERIOD_NS).expect("the built-in scene");
+        let rig = play::rig(None, &Settings::default(), PERIOD_NS, &StopSignals::default())
+            .expect("the built-in scene");
         assert_eq!(entity(&rig, "cube"), CUBE);
         let mut table = Self::of(&rig);
         table.wait(0.5);
@@ -233,7 +235,8 @@ fn a_hand_that_is_told_to_jump_goes_there_like_a_hand_and_nothing_has_to_be_cut(
 #[test]
 fn what_is_below_the_hand_is_the_cube_at_first() {
     let mut table = Table::new();
-    let rig = play::rig(None, &Settings::default(), PERIOD_NS).expect("the built-in scene");
+    let rig = play::rig(None, &Settings::default(), PERIOD_NS, &StopSignals::default())
+        .expect("the built-in scene");
     let picker = Picker::new(&Stage::new(&rig.scene, table.fast.step_mut().entities()));
     let poses = table.fast.step_mut().entities().iter().map(|entity| entity.X_WB).collect();
     let moment = Moment { poses, ..Moment::default() };
@@ -247,7 +250,8 @@ fn what_is_below_the_hand_is_the_cube_at_first() {
 
 /// Plays a scene for 300 ms without anybody doing anything; where the fingers began (m).
 fn untouched(file: &Path) -> Vec<Vector3<f64>> {
-    let rig = play::rig(Some(file), &Settings::default(), PERIOD_NS).expect("a scene");
+    let rig =
+        play::rig(Some(file), &Settings::default(), PERIOD_NS, &StopSignals::default()).expect("a scene");
     let mut table = Table::of(&rig);
     while table.ticks < 300 {
         table.picture(Vec2::ZERO);

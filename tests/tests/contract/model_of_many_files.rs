@@ -1,7 +1,8 @@
 //! A model that consists of several files, as glTF does: nothing is written into any of them, and recordings have them all.
 
+use rustix::process::{Pid, Signal, kill_process};
 use std::fs;
-use system_tests::workplace::{Workplace, hand};
+use system_tests::workplace::{Running, Workplace, hand};
 
 /// A box of 10 cm, with its numbers and its picture in a directory beside it.
 const BOX: &str = r#"{"asset": {"version": "2.0"}, "nodes": [{"mesh": 0}],
@@ -81,4 +82,38 @@ fn a_texture_that_cannot_be_seen_is_a_warning() {
             "images[0] (`parts/skin%201.png`): found a file of another kind; allowed: a PNG or JPEG file";
         assert!(said.out.contains(words), "{file}: {}", said.out);
     }
+}
+
+/// Eight textures of 67 million places each take many seconds.
+#[test]
+fn a_run_that_reads_for_long_says_what_and_a_signal_ends_it() {
+    let place = with_box();
+    let mut picture = Vec::new();
+    let mut encoder = png::Encoder::new(&mut picture, 8192, 8192);
+    encoder.set_color(png::ColorType::Grayscale);
+    encoder.set_depth(png::BitDepth::One);
+    encoder.write_header().expect("a header").write_image_data(&vec![0x55; 1 << 23]).expect("a picture");
+    let numbers = 0..8;
+    numbers.clone().for_each(|k| place.write(&format!("parts/{k}.png"), &picture));
+    let list = |of: fn(u8) -> String| numbers.clone().map(of).collect::<Vec<_>>().join(", ");
+    let materials =
+        list(|k| format!(r#"{{"pbrMetallicRoughness": {{"baseColorTexture": {{"index": {k}}}}}}}"#));
+    let textures = list(|k| format!(r#"{{"source": {k}}}"#));
+    let images = list(|k| format!(r#"{{"uri": "parts/{k}.png"}}"#));
+    let many = BOX
+        .replace(r#"{"pbrMetallicRoughness": {"baseColorTexture": {"index": 0}}}"#, &materials)
+        .replace(r#"{"source": 0}"#, &textures)
+        .replace(r#"{"uri": "parts/skin%201.png"}"#, &images);
+    place.write("box.gltf", many);
+    let mut program = place.phantom3();
+    program.args(["run", "scene.toml", "--clock", "virtual", "--seconds", "86400", "--record", "out.csv"]);
+    let running = Running::start(program);
+    patience::until("a word of what is read", || {
+        running.said_so_far().contains("phantom3: reading scene.toml (1 s)\n")
+    });
+    kill_process(Pid::from_child(&running.child), Signal::INT).expect("it runs");
+    let said = running.wait();
+    assert_eq!(said.status, Some(128 + 2), "{}", said.err);
+    assert!(said.err.contains("ended by signal 2 before its time"), "{}", said.err);
+    assert!(!place.path("out.csv").exists());
 }
