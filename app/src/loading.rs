@@ -9,7 +9,7 @@ use std::sync::mpsc::{RecvTimeoutError, sync_channel};
 use std::thread::ScopedJoinHandle;
 use std::time::{Duration, Instant};
 
-/// Less is no waiting.
+/// Less is no waiting, on a terminal; a file that takes what is said hears later.
 const SOON: Duration = Duration::from_secs(1);
 /// Between two looks for a signal.
 const TURN: Duration = Duration::from_millis(20);
@@ -21,7 +21,7 @@ pub(crate) fn while_reading<T>(file: &Path, signals: &StopSignals, work: impl Fn
     let (done, is_done) = sync_channel::<()>(0);
     std::thread::scope(|scope| {
         let tell = move || {
-            let mut line = StatusLine::default();
+            let mut line = StatusLine::told_just_now();
             while is_done.recv_timeout(TURN) == Err(RecvTimeoutError::Timeout) {
                 if let Some(signal) = signals.requested() {
                     line.end();

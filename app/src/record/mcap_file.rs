@@ -387,9 +387,14 @@ fn value(facts: &Facts) -> f64 {
 
 /// The writer panics where the compressor finds no memory, as it does at the beginning of a chunk.
 fn has_memory_for_a_chunk() -> io::Result<()> {
+    // What else is asked for until then.
+    let mut spare = Vec::<u8>::new();
+    spare.try_reserve_exact(SPARE_BYTES).map_err(|_| rustix::io::Errno::NOMEM)?;
     let tried = lz4::EncoderBuilder::new().build(io::sink());
     tried.map(drop).map_err(|_| rustix::io::Errno::NOMEM.into())
 }
+
+const SPARE_BYTES: usize = 1 << 18;
 
 /// Chunks are ended here and nowhere else, and go out in one piece.
 fn options() -> WriteOptions {
@@ -421,6 +426,7 @@ fn begin(
         })?;
     }
     let set = schema::descriptors(names);
+    has_memory_for_a_chunk()?;
     let mut channel = |topic: &str, message: &str| add_channel(writer, topic, message, &set);
     Ok(Channels {
         tick: channel(TICK_TOPIC, schema::TICK)?,

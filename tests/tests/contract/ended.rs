@@ -108,5 +108,6 @@ fn a_run_on_the_virtual_clock_that_a_fault_ends_tells_what_it_recorded() {
     assert_eq!(said.status, Some(3), "{}", said.err);
     assert!(said.err.contains("moved faster than it may"), "{}", said.err);
     let rows = Table::read(&place.path("out.csv")).len();
-    assert!(said.err.contains(&format!("recording    out.csv ({rows} rows)")), "{rows}: {}", said.err);
+    assert!(said.out.contains(&format!("recording    out.csv ({rows} rows)")), "{rows}: {}", said.out);
+    assert!(said.out.contains("1 faults") && said.out.contains("peak force   "), "{}", said.out);
 }

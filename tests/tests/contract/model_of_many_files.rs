@@ -1,8 +1,11 @@
 //! A model that consists of several files, as glTF does: nothing is written into any of them, and recordings have them all.
 
+use patience::prelude::*;
 use rustix::process::{Pid, Signal, kill_process};
 use std::fs;
-use system_tests::workplace::{Running, Workplace, hand};
+use std::process::Stdio;
+use system_tests::faults::terminal::Terminal;
+use system_tests::workplace::{Workplace, hand};
 
 /// A box of 10 cm, with its numbers and its picture in a directory beside it.
 const BOX: &str = r#"{"asset": {"version": "2.0"}, "nodes": [{"mesh": 0}],
@@ -105,15 +108,14 @@ fn a_run_that_reads_for_long_says_what_and_a_signal_ends_it() {
         .replace(r#"{"source": 0}"#, &textures)
         .replace(r#"{"uri": "parts/skin%201.png"}"#, &images);
     place.write("box.gltf", many);
+    let terminal = Terminal::open();
     let mut program = place.phantom3();
-    program.args(["run", "scene.toml", "--clock", "virtual", "--seconds", "86400", "--record", "out.csv"]);
-    let running = Running::start(program);
-    patience::until("a word of what is read", || {
-        running.said_so_far().contains("phantom3: reading scene.toml (1 s)\n")
-    });
-    kill_process(Pid::from_child(&running.child), Signal::INT).expect("it runs");
-    let said = running.wait();
-    assert_eq!(said.status, Some(128 + 2), "{}", said.err);
-    assert!(said.err.contains("ended by signal 2 before its time"), "{}", said.err);
+    program.args(["run", "scene.toml", "--clock", "virtual", "--seconds", "5", "--record", "out.csv"]);
+    let mut child = program.stdout(Stdio::null()).stderr(terminal.end()).spawn().expect("it starts");
+    terminal.wait_for("phantom3: reading scene.toml (1 s)");
+    kill_process(Pid::from_child(&child), Signal::INT).expect("it runs");
+    terminal.wait_for("ended by signal 2 before its time");
+    let status = child.bounded_wait();
+    assert_eq!(status.code(), Some(128 + 2));
     assert!(!place.path("out.csv").exists());
 }

@@ -276,15 +276,14 @@ fn a_recording_that_was_removed_meanwhile_is_not_told_as_if_it_were_there() {
 
 #[test]
 fn a_recording_on_a_closed_standard_output_is_refused_before_anything_runs() {
-    for output in ["--record", "--events"] {
+    for (output, name) in [("--record", "recording"), ("--events", "file of events")] {
         for clock in ["virtual", "real"] {
             let place = workplace();
             let arguments = ["--clock", clock, "--seconds", "0.2", output, "-"];
             let said = place.shell("exec \"$0\" \"$@\" >&-", &arguments);
             assert_eq!(said.status, Some(2), "{}", said.err);
-            let told =
-                "cannot create the recording the standard output: it was closed when this program started";
-            assert!(said.err.contains(told), "{}", said.err);
+            let told = format!("cannot create the {name} the standard output: it was closed when");
+            assert!(said.err.contains(&told), "{}", said.err);
             assert_eq!(place.processes(), Vec::<u32>::new());
         }
     }

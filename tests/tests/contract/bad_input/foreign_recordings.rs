@@ -174,7 +174,7 @@ fn a_table_that_export_calls_damaged_is_called_so_by_plot_in_the_same_words() {
             with_row(row.replacen(state, "sliding", 1)),
             "bad.csv:51: f0_friction is \"sliding\", which is no word",
         ),
-        (with_row(format!("\"{time}\",{cells}")), "bad.csv:51: t is \"\\\""),
+        (with_row(format!("\"{time},{cells}")), "bad.csv:51: t is \"\\\""),
         (with_row(format!("\t{row}")), "bad.csv:51: t is \"\\t"),
         (with_row(format!("{row},1")), "bad.csv:51: found"),
     ] {
