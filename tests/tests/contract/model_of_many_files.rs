@@ -97,7 +97,9 @@ fn a_run_that_reads_for_long_says_what_and_a_signal_ends_it() {
     encoder.set_depth(png::BitDepth::One);
     encoder.write_header().expect("a header").write_image_data(&vec![0x55; 1 << 23]).expect("a picture");
     let numbers = 0..8;
-    numbers.clone().for_each(|k| place.write(&format!("parts/{k}.png"), &picture));
+    for k in numbers.clone() {
+        place.write(&format!("parts/{k}.png"), &picture);
+    }
     let list = |of: fn(u8) -> String| numbers.clone().map(of).collect::<Vec<_>>().join(", ");
     let materials =
         list(|k| format!(r#"{{"pbrMetallicRoughness": {{"baseColorTexture": {{"index": {k}}}}}}}"#));

@@ -75,7 +75,7 @@ fn usual_slips_are_refused_with_what_to_write_and_not_with_what_the_parser_wante
         ),
         (
             "radius_m = 1/3\n",
-            "1:13: not valid TOML: found 1/3, allowed: a number that is worked out, as in 0.333",
+            "1:12: not valid TOML: found 1/3, allowed: a number that is worked out, as in 0.333",
         ),
         (
             "radius_m = 0.3kg\n",
