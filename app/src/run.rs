@@ -7,6 +7,7 @@ use crate::control::carriage::Carriage;
 use crate::control::desk::{Desk, Means, OrderSource};
 use crate::fast_loop::{FastLoop, Tally, WhenFull};
 use crate::live::LiveHandFile;
+use crate::loading::while_reading;
 use crate::moments::Moments;
 use crate::not_zeroed;
 use crate::on_request::OnRequest;
@@ -38,7 +39,7 @@ use shm_abi::{CommanderMemory, DriverView, Frame};
 use std::path::{Path, PathBuf};
 use std::sync::mpsc::{self, Receiver};
 use std::time::Duration;
-use view::{NoWindow, OpenWindow, Reins, WindowSpec};
+use view::{NoWindow, OpenWindow, Reins, Stage, WindowSpec};
 use world::Settings;
 use world::events::{Hub, event_queue};
 use world::lists::SlowList;
@@ -107,10 +108,23 @@ pub fn run(rig: &Rig, plan: &RunPlan, signals: &StopSignals) -> Result<(Report, 
     // A terminal held by Ctrl-S holds no run, and no lease.
     let thread = log_thread::start("phantom3");
     thread.map_err(|error| no_thread("the log", &error))?;
+    // Before anything is made that a signal would leave.
+    let stage = stage(rig, plan, signals)?;
     match plan.clock {
-        Some(ClockMode::Virtual) => run_virtual(rig, plan, signals),
-        _ => run_two_processes(rig, plan, signals),
+        Some(ClockMode::Virtual) => run_virtual(rig, plan, stage, signals),
+        _ => run_two_processes(rig, plan, stage, signals),
     }
+}
+
+/// What pictures and the window show, if there are any.
+fn stage(rig: &Rig, plan: &RunPlan, signals: &StopSignals) -> Result<Option<Stage>, RunFailure> {
+    let has_window = plan.window.is_some() && plan.clock != Some(ClockMode::Virtual);
+    if plan.pictures.is_none() && !has_window {
+        return Ok(None);
+    }
+    let step = rig.fast_step().map_err(|error| RunFailure::Start(error.to_string()))?;
+    let make = || Stage::new(&rig.scene, step.entities());
+    Ok(Some(while_reading(&rig.scene_file, signals, make)))
 }
 
 /// The parts that every clock needs.
@@ -130,7 +144,7 @@ impl Parts {
         period_ns: u64,
         devices: &[Extras],
         about: &About,
-        reins: Option<Box<dyn Reins>>,
+        (stage, reins): (Option<Stage>, Option<Box<dyn Reins>>),
     ) -> Result<Self, RunFailure> {
         let seconds = plan.seconds.unwrap_or_else(|| rig.default_seconds());
         let total_ticks = (seconds * 1e9 / period_ns as f64).round() as u64;
@@ -152,13 +166,12 @@ impl Parts {
             book: book.clone(),
             slow_lists: (clock == ClockMode::Real).then_some(sender),
         };
-        let shown = || Shown::new(rig, step.entities());
+        let shown = stage.map(|stage| Shown::on(stage, rig, step.entities()));
         let (events, event_ends) = event_queue(EVENT_QUEUE);
         let mut hub = Hub::new(vec![event_ends]);
-        let opened = match window {
-            Some(spec) => {
+        let opened = match window.zip(shown.clone()) {
+            Some((spec, shown)) => {
                 let carries_devices = rig.goes_with_the_camera();
-                let shown = shown();
                 for line in &shown.stage.not_drawn {
                     say(format_args!("phantom3: not in the window as it should be: {line}"));
                 }
@@ -195,10 +208,10 @@ impl Parts {
             about: about.clone(),
             taken: plan.inputs.iter().chain(&others).chain(pictures).cloned().collect(),
         };
-        let snapshots = plan
-            .pictures
-            .as_ref()
-            .map(|wanted| Snapshots::start(wanted, shown(), period_ns, when_full == WhenFull::Wait));
+        let snapshots =
+            plan.pictures.as_ref().zip(shown).map(|(wanted, shown)| {
+                Snapshots::start(wanted, shown, period_ns, when_full == WhenFull::Wait)
+            });
         let snapshots = snapshots.transpose().map_err(RunFailure::Start)?;
         // The last: it makes files. Those with content are emptied by their first rows, once all threads are there.
         let recorders = files.first(rig, &view)?;
@@ -236,13 +249,18 @@ fn open_window(
     }
 }
 
-fn run_virtual(rig: &Rig, plan: &RunPlan, signals: &StopSignals) -> Result<(Report, Stop), RunFailure> {
+fn run_virtual(
+    rig: &Rig,
+    plan: &RunPlan,
+    stage: Option<Stage>,
+    signals: &StopSignals,
+) -> Result<(Report, Stop), RunFailure> {
     let config = rig.driver_config(ClockMode::Virtual);
     let devices = open_devices_with(&config, rig.hand_files())?;
     let mut driver = VirtualDriver::with_devices(&config, devices)?;
     let about = About::of_run(rig, ClockMode::Virtual, rig.period_ns, plan.seed);
     let Parts { mut fast, mut slow, mut progress, .. } =
-        Parts::new(rig, plan, ClockMode::Virtual, rig.period_ns, &driver.extras(), &about, None)?;
+        Parts::new(rig, plan, ClockMode::Virtual, rig.period_ns, &driver.extras(), &about, (stage, None))?;
     let stop = driver.run(&mut fast, &mut slow, &mut progress, signals);
     progress.end();
     let SlowEnd { recordings, events, pictures } = slow.finish();
@@ -266,8 +284,13 @@ fn run_virtual(rig: &Rig, plan: &RunPlan, signals: &StopSignals) -> Result<(Repo
     Ok((report, stop))
 }
 
-fn run_two_processes(rig: &Rig, plan: &RunPlan, signals: &StopSignals) -> Result<(Report, Stop), RunFailure> {
-    let rig = &seen_from_the_window(rig, plan)?;
+fn run_two_processes(
+    rig: &Rig,
+    plan: &RunPlan,
+    stage: Option<Stage>,
+    signals: &StopSignals,
+) -> Result<(Report, Stop), RunFailure> {
+    let rig = &seen_from_the_window(rig, plan, stage.as_ref())?;
     let live = rig.is_live().then(LiveHandFile::make).transpose()?;
     let (mut source, attachment) = connect(rig, plan, live.as_ref())?;
     let info = attachment.driver.info();
@@ -289,7 +312,7 @@ fn run_two_processes(rig: &Rig, plan: &RunPlan, signals: &StopSignals) -> Result
     let reins = live.map(|live| live.into_reins(rig)).transpose()?;
     let reins = reins.map(|reins| Box::new(reins) as Box<dyn Reins>);
     let Parts { fast, mut slow, mut progress, slow_lists } =
-        Parts::new(&step_rig, plan, info.clock_mode, info.period_ns, &extras, &about, reins)?;
+        Parts::new(&step_rig, plan, info.clock_mode, info.period_ns, &extras, &about, (stage, reins))?;
     slow.watch_driver(source.socket());
     let watched = (&mut slow, &mut progress, signals);
     let known = (&premises, &mut totals);
@@ -340,13 +363,14 @@ fn tell_kept(recordings: &[Recorded]) {
 }
 
 /// At a window the camera that devices go with is the window's, from the beginning.
-fn seen_from_the_window(rig: &Rig, plan: &RunPlan) -> Result<Rig, RunFailure> {
-    let wrong = |error: RigError| RunFailure::Start(error.to_string());
-    if plan.window.is_none() || !rig.goes_with_the_camera() {
-        return Ok(rig.clone());
+fn seen_from_the_window(rig: &Rig, plan: &RunPlan, stage: Option<&Stage>) -> Result<Rig, RunFailure> {
+    match stage.filter(|_| plan.window.is_some() && rig.goes_with_the_camera()) {
+        Some(stage) => {
+            let seen = rig.clone().seen_from(stage.cameras[0].pose);
+            seen.map_err(|error: RigError| RunFailure::Start(error.to_string()))
+        }
+        None => Ok(rig.clone()),
     }
-    let stage = Shown::new(rig, rig.fast_step().map_err(wrong)?.entities()).stage;
-    rig.clone().seen_from(stage.cameras[0].pose).map_err(wrong)
 }
 
 /// What is told of entities that were parked.

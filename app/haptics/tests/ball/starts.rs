@@ -113,7 +113,7 @@ fn no_ball_that_flies_on_from_where_it_was_put_is_flung_when_it_lands() {
 
 /// Ten million starts.
 #[test]
-#[ignore = "hours"]
+#[ignore = "a quarter of an hour"]
 fn no_ball_that_begins_anywhere_of_ten_million_is_flung() {
     begin_on_ugly_meshes(3..40, 3400);
 }

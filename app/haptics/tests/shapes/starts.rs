@@ -82,7 +82,7 @@ fn no_finger_that_begins_inside_a_form_is_flung() {
 
 /// Ten million starts.
 #[test]
-#[ignore = "an hour"]
+#[ignore = "three minutes"]
 fn no_finger_that_begins_anywhere_of_ten_million_is_flung() {
     begin_on_all_forms(30_000, 2);
 }
