@@ -65,6 +65,8 @@ pub struct FastLoop {
     offset_ticks: Option<u64>,
     /// The run's first tick that no row has told of.
     next_tick: u64,
+    /// The driver's tick of the last row.
+    row_tick: u64,
     /// The row that waits for what the motors did, and the driver's tick it belongs to.
     pending: Option<(u64, Row)>,
     /// The bodies that have changed since the last row that was sent, by their numbers in ascending order.
@@ -147,6 +149,7 @@ impl FastLoop {
             base_ns: None,
             offset_ticks: None,
             next_tick: 0,
+            row_tick: 0,
             pending: None,
             frame: Frame::zeroed(),
             following: Frame::zeroed(),
@@ -207,10 +210,15 @@ impl FastLoop {
         if self.is_finished() { Turn::Finished } else { Turn::Answered }
     }
 
-    /// In the tick after the last row.
+    /// So long after the last row as the driver's ticks say. Before the first one nothing has happened.
     fn tell_fault(&mut self) {
+        if self.next_tick == 0 {
+            return;
+        }
+        let since = self.frame.tick.saturating_sub(self.row_tick);
+        let run_tick = self.row.run_tick.saturating_add(since);
         if let Some(events) = &mut self.events {
-            events.send(Event { run_tick: self.next_tick, kind: Kind::Fault { reason: self.frame.fault } });
+            events.send(Event { run_tick, kind: Kind::Fault { reason: self.frame.fault } });
         }
     }
 
@@ -320,6 +328,7 @@ impl FastLoop {
         }
         self.place_in_time();
         self.row.run_tick = self.run_ticks();
+        self.row_tick = self.frame.tick;
         self.row.due_ns = self.frame.deadline_ns;
         self.tally.park(self.step.parked_now(), self.row.run_tick, self.is_first_scene);
         self.tally.crowded += u64::from(self.step.is_crowded());

@@ -29,18 +29,23 @@ pub enum Stop {
 }
 
 impl Stop {
-    /// The same, of a run; one that failed before it answered a tick has nothing to report.
+    /// The same, of a run, whose failure is told at once: whoever reads its recordings may take long. One that failed before it
+    /// answered a tick has nothing to report.
     ///
     /// # Errors
     /// That failure.
     pub fn of_run(self, tally: &Tally) -> Result<Self, RunFailure> {
         match self {
             Self::Failed(failure) if tally.answered == 0 => Err(failure),
+            Self::Failed(failure) => {
+                say(format_args!("phantom3: {failure}"));
+                Ok(Self::Failed(failure))
+            }
             other => Ok(other),
         }
     }
 
-    /// Tells a signal or a failure; returns the exit status, which after a signal is 128 and its number.
+    /// Tells a signal; a failure has been told. Returns the exit status, which after a signal is 128 and its number.
     pub fn conclude(self) -> ExitCode {
         match self {
             Self::Finished | Self::Closed => ExitCode::SUCCESS,
@@ -48,7 +53,7 @@ impl Stop {
                 say(format_args!("phantom3: ended by signal {signal} before its time"));
                 ExitCode::from(128u8.saturating_add(u8::try_from(signal).unwrap_or(0)))
             }
-            Self::Failed(failure) => failure.conclude(),
+            Self::Failed(failure) => ExitCode::from(failure.exit_status()),
         }
     }
 }

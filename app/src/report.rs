@@ -91,6 +91,9 @@ impl fmt::Display for Report {
             counters.commands_torn,
             counters.commands_refused
         )?;
+        if counters.faults > 0 {
+            writeln!(f, "faults       {} of the driver, whose motors were off", counters.faults)?;
+        }
         if let Some(timing) = &self.timing {
             writeln!(f, "wake error   {}", timing.wake_error)?;
             writeln!(f, "driver work  {}", timing.cycle)?;

@@ -24,7 +24,7 @@ use crate::shown::Shown;
 use crate::slow::{SlowEnd, SlowSide};
 use crate::snapshots::{Snapshots, Wanted};
 use crate::spectator::Spectator;
-use crate::two_processes::{self, Source};
+use crate::two_processes::{self, Source, TwoProcessEnd};
 use crate::virtual_clock::VirtualDriver;
 use io_driver::device::Extras;
 use io_driver::log_thread;
@@ -263,8 +263,9 @@ fn run_virtual(
         Parts::new(rig, plan, ClockMode::Virtual, rig.period_ns, &driver.extras(), &about, (stage, None))?;
     let stop = driver.run(&mut fast, &mut slow, &mut progress, signals);
     progress.end();
+    let stop = stop.of_run(&fast.tally);
     let SlowEnd { recordings, events, pictures } = slow.finish();
-    let stop = stop.of_run(&fast.tally).inspect_err(|_| tell_kept(&recordings))?;
+    let stop = stop.inspect_err(|_| tell_kept(&recordings))?;
     let report = Report {
         clock: ClockMode::Virtual.name(),
         period_ns: rig.period_ns,
@@ -324,9 +325,12 @@ fn run_two_processes(
         slow.take_back();
         return Err(failure);
     }
+    let ended = result.and_then(|end| {
+        let TwoProcessEnd { stop, tally, .. } = end;
+        Ok(TwoProcessEnd { stop: stop.of_run(&tally)?, ..end })
+    });
     let SlowEnd { recordings, events, pictures } = slow.finish();
-    let end = result.inspect_err(|_| tell_kept(&recordings))?;
-    let stop = end.stop.of_run(&end.tally).inspect_err(|_| tell_kept(&recordings))?;
+    let end = ended.inspect_err(|_| tell_kept(&recordings))?;
     let is_real = info.clock_mode == ClockMode::Real;
     let report = Report {
         clock: info.clock_mode.name(),
@@ -344,7 +348,7 @@ fn run_two_processes(
         recordings,
         pictures,
     };
-    Ok((report, stop))
+    Ok((report, end.stop))
 }
 
 /// Inputs of the run that a recording which is to have all of them lacks.

@@ -61,6 +61,12 @@ fn with_quotes(set: &str) -> Cow<'_, str> {
     if !begins_as_text || !is_plain || is_word || text.parse::<f64>().is_ok() {
         return set.into();
     }
+    // No shell does this behind an equals sign.
+    let home = std::env::var("HOME").ok().filter(|home| !home.contains(['"', '\\']));
+    let text = match (text.strip_prefix("~/"), home) {
+        (Some(rest), Some(home)) => format!("{home}/{rest}"),
+        _ => text.to_owned(),
+    };
     format!("{key}=\"{text}\"").into()
 }
 

@@ -278,6 +278,8 @@ impl SlowSide {
         let told = summary(&self.events);
         self.closed.append(&mut self.recorders);
         self.closed.extend(self.on_request.as_mut().and_then(OnRequest::end));
+        // All before any is waited for, whose reader may be slow.
+        self.closed.iter_mut().for_each(Recorder::close);
         self.failed.extend(self.closed.into_iter().map(Recorder::finish));
         let pictures = self.snapshots.map(Snapshots::finish);
         SlowEnd { recordings: self.failed, events: told, pictures }

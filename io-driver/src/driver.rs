@@ -21,7 +21,7 @@ use crate::stop_thread;
 use crate::supervisor::Supervisor;
 use rt_core::epitaph::{install_fatal_handlers, install_panic_hook};
 use rt_core::privileges::{User, UserError};
-use rt_core::setup::{PromotedChildren, SetupReport};
+use rt_core::setup::SetupReport;
 use rt_core::signals::StopSignals;
 use shm_abi::DriverMemory;
 use shm_abi::doorbell::WaitMode;
@@ -145,6 +145,12 @@ pub fn run(config: &DriverConfig, options: &RunOptions) -> Result<(), RunError> 
     let shared =
         Shared { signals: Some(signals.clone()), heartbeat: Some(heartbeat.clone()), ..Shared::default() };
     let (mut report, spin_margin_ns, starter) = loop_thread::spawn(config, &shared)?;
+    let no_thread = |what| move |source| RunError::NoThread { what, source };
+    let stops =
+        stop_thread::Starter::spawn(loop_thread::priority(config)).map_err(no_thread("listen for stops"))?;
+    // Where the loop has no real time that is told once.
+    let has_real_time = report.find("scheduling").is_some_and(|item| item.obtained);
+    report.guarantees.extend(stops.guarantee.clone().filter(|_| has_real_time));
     refuse_if_strict(&report, options)?;
     let wait_mode = loop_thread::choose_wait_mode(config, &report);
     let waiting = Waiting { reply: wait_mode, spin_margin_ns };
@@ -160,11 +166,7 @@ pub fn run(config: &DriverConfig, options: &RunOptions) -> Result<(), RunError> 
     // The usual places may be made without a word; a name that is mistyped is told by what it makes.
     let missing = named.as_deref().and_then(missing_directory);
     let path = named.unwrap_or_else(shm_abi::endpoint::for_driver);
-    // Programs of real time that fill all CPUs keep no stop waiting: its threads are next below the loop. They start late,
-    // when the right to this is given up.
-    let below = |priority: u8| PromotedChildren::begin(priority.saturating_sub(1).max(1));
-    let promoted = config.real_time.priority.map(below);
-    give_up_rights(user.as_ref(), &path, &mut report, &starter)?;
+    give_up_rights(user.as_ref(), &path, &mut report, (&starter, &stops))?;
     if user.is_some() {
         // The kernel forgets the request when the user changes.
         die_with_parent(options)?;
@@ -179,11 +181,8 @@ pub fn run(config: &DriverConfig, options: &RunOptions) -> Result<(), RunError> 
         say(options, format_args!("made the directory {} for the socket", directory.display()));
     }
     // The last threads: the sandbox lets none be started.
-    let no_thread = |what| move |source| RunError::NoThread { what, source };
     let (stop_socket, stop_file) = StopSocket::bind(server.path())?;
-    stop_thread::start(stop_socket, sender.urgent.clone(), options.quiet)
-        .map_err(no_thread("listen for stops"))?;
-    drop(promoted);
+    stops.start(stop_socket, sender.urgent.clone(), options.quiet).map_err(no_thread("listen for stops"))?;
     let lost = drain.lost_count();
     log_thread::start_for_driver(drain, options.quiet).map_err(no_thread("start the log"))?;
     refuse_without_descriptors()?;
@@ -265,12 +264,16 @@ fn give_up_rights(
     user: Option<&User>,
     socket: &Path,
     report: &mut SetupReport,
-    starter: &loop_thread::Starter,
+    (starter, stops): (&loop_thread::Starter, &stop_thread::Starter),
 ) -> Result<(), RunError> {
     if let Some(user) = user {
         sandbox::make_directory_for(user, socket);
     }
-    Ok(sandbox::give_up_rights(user, report, |keep| starter.give_up_rights(keep))?)
+    let others = |keep| {
+        starter.give_up_rights(keep);
+        stops.give_up_rights(keep);
+    };
+    Ok(sandbox::give_up_rights(user, report, others)?)
 }
 
 /// An application that finds none left would wait for an answer, and not be told why.

@@ -31,13 +31,17 @@ pub(crate) fn loop_cpu(config: &DriverConfig) -> Option<usize> {
     config.real_time.cpu.or_else(|| cpus.last().copied().filter(|_| cpus.len() > 1))
 }
 
+/// The priority that is asked for; in lockstep nothing is on time by design, so none is.
+pub(crate) fn priority(config: &DriverConfig) -> Option<u8> {
+    config.real_time.priority.filter(|_| config.clock == ClockMode::Real)
+}
+
 fn setup_request(config: &DriverConfig) -> SetupRequest {
-    // In lockstep nothing is on time by design, so nothing is asked for.
     if config.clock != ClockMode::Real {
         return SetupRequest::default();
     }
     SetupRequest {
-        fifo_priority: config.real_time.priority,
+        fifo_priority: priority(config),
         cpu: loop_cpu(config),
         lock_memory: config.real_time.lock_memory,
         prefault_stack_bytes: STACK_BYTES,

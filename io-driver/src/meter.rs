@@ -40,14 +40,18 @@ pub fn read(block: &HistogramBlock) -> Histogram {
     Histogram::from_counts(&counts, block.max_ns.load(Ordering::Relaxed))
 }
 
-/// What was recorded between two readings of one histogram. The largest value of the interval is not
-/// known exactly: it is the upper end of its highest bucket, or the overall one if that is smaller.
+/// What was recorded between two readings of one histogram. The largest value of the interval is known exactly if it is the
+/// largest of all; else it is the upper end of its highest bucket, or the overall one if that is smaller.
 pub fn since(before: &Histogram, after: &Histogram) -> Histogram {
     let mut counts = Box::new([0; BUCKETS]);
     for (count, (new, old)) in counts.iter_mut().zip(after.counts().iter().zip(before.counts())) {
         *count = new.saturating_sub(*old);
     }
-    Histogram::from_counts(&counts, after.max())
+    let between = Histogram::from_counts(&counts, after.max());
+    if after.max() > before.max() {
+        return between;
+    }
+    Histogram::from_counts(&counts, between.percentile(1.0).unwrap_or(0))
 }
 
 #[cfg(test)]
@@ -80,9 +84,13 @@ mod tests {
     #[test]
     fn an_interval_forgets_what_was_before_it() {
         let block = block();
-        record(&block, 5);
+        record(&block, 40_000);
         let before = read(&block);
+        assert_eq!(since(&before, &before).max(), 0);
         record(&block, 9);
-        assert_eq!(since(&before, &read(&block)).percentile(1.0), Some(9));
+        let between = since(&before, &read(&block));
+        assert_eq!((between.percentile(1.0), between.max()), (Some(9), 9));
+        record(&block, 50_001);
+        assert_eq!(since(&before, &read(&block)).max(), 50_001);
     }
 }

@@ -2,7 +2,7 @@
 //!
 //! Problem: the driver starts with real-time rights, perhaps as root, and then talks to strangers for hours.
 //! Model, in this order, each read back from the kernel: locked memory is made independent of the capability;
-//! both threads, service and loop, give up their capabilities and the possibility of new ones; a driver started by root becomes
+//! all threads, those of service, loop and stops, give up their capabilities and the possibility of new ones; a driver started by root becomes
 //! the configured user; once it listens, all system calls but those of [`allowed_calls`] are shut out, for
 //! all threads at once, those that stop and log among them. What was opened, mapped, locked and promoted before stays.
 //! Invariant: nothing here is needed to run; what is missing is told, and refused by `--strict`.

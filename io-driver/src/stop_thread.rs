@@ -13,6 +13,8 @@ use crate::say::say;
 use crate::urgent::Urgent;
 use rt_core::clock::monotonic_ns;
 use rt_core::last_act;
+use rt_core::privileges::{Keep, reduce_thread};
+use rt_core::setup::{Guarantee, promote_beside};
 use rt_core::signals;
 use shm_abi::stop_socket::{Drain, StopSocket};
 use std::io;
@@ -26,43 +28,106 @@ const TAKEN_WITHIN: Duration = Duration::from_millis(5);
 /// A receive, a line of the log and a handler of signals.
 const STACK_BYTES: usize = 64 * 1024;
 
-/// Starts them; from now on all other threads leave signals to the first.
-///
-/// # Errors
-/// What the system says to other threads, or to their signals.
-pub(crate) fn start(socket: StopSocket, urgent: Urgent, is_quiet: bool) -> io::Result<()> {
-    signals::block_in_this_thread()?;
-    let queue = Queue::start(socket.drain()?)?;
-    let (tell_begun, begun) = sync_channel(1);
-    let thread = std::thread::Builder::new().name("stop".into()).stack_size(STACK_BYTES);
-    thread.spawn(move || {
-        let receives = signals::receive_in_this_thread();
-        let is_ready = receives.is_ok();
-        let _ = tell_begun.send(receives);
-        if is_ready {
-            run(socket, queue, &urgent, is_quiet);
-        }
-    })?;
-    // The sandbox that is shut next knows nothing of the calls by which threads begin.
-    begun.recv().unwrap_or_else(|_| Err(io::Error::other("it ended at once")))
+/// The first of them, which waits for its socket. Like the loop's it is there before rights are given up, as its priority is
+/// its own.
+pub(crate) struct Starter {
+    send: SyncSender<Order>,
+    begun: Receiver<io::Result<()>>,
+    /// What it obtained; `None`: the loop has no real time either.
+    pub(crate) guarantee: Option<Guarantee>,
 }
 
-fn run(mut socket: StopSocket, mut queue: Queue, urgent: &Urgent, is_quiet: bool) {
-    loop {
-        let may_take = queue.is_taken();
-        // A signal interrupts, which is no failure; of any other one the rest is a slower turn.
-        if let Ok(user) = socket.hear() {
-            let is_new = urgent.stop(user, monotonic_ns());
-            if may_take {
-                queue.take();
+/// What it is to do next.
+enum Order {
+    /// Give up its rights, which only it can, and drop the sender when that is done.
+    GiveUpRights(Keep, SyncSender<()>),
+    /// Hear stops.
+    Run(Box<Stops>),
+}
+
+/// Where stops are heard, and to whom they go.
+struct Stops {
+    socket: StopSocket,
+    queue: Queue,
+    urgent: Urgent,
+    is_quiet: bool,
+}
+
+impl Starter {
+    /// Starts it; from now on all other threads leave signals to it. It has the loop's priority: programs of real time that
+    /// fill all CPUs, and leave the loop its own, keep no stop waiting.
+    ///
+    /// # Errors
+    /// What the system says to another thread, or to the signals of this one.
+    pub(crate) fn spawn(loop_priority: Option<u8>) -> io::Result<Self> {
+        signals::block_in_this_thread()?;
+        let (send, orders) = sync_channel(1);
+        let (tell_begun, begun) = sync_channel(1);
+        let (tell_guarantee, guarantee) = sync_channel(1);
+        let thread = std::thread::Builder::new().name("stop".into()).stack_size(STACK_BYTES);
+        thread.spawn(move || {
+            let _ = tell_guarantee.send(loop_priority.map(|priority| promote_beside("stops", priority)));
+            for order in orders {
+                match order {
+                    Order::GiveUpRights(keep, _done) => reduce_thread(keep),
+                    Order::Run(stops) => {
+                        let receives = signals::receive_in_this_thread();
+                        let is_ready = receives.is_ok();
+                        let _ = tell_begun.send(receives);
+                        if is_ready {
+                            stops.hear();
+                        }
+                    }
+                }
             }
-            if is_new && !is_quiet {
-                let user = user.map_or("an unknown user".into(), |user| format!("user {user}"));
-                say(format_args!("io-driver: emergency stop, asked for by {user} by datagram"));
+        })?;
+        let guarantee = guarantee.recv().map_err(|_| ended())?;
+        Ok(Self { send, begun, guarantee })
+    }
+
+    pub(crate) fn give_up_rights(&self, keep: Keep) {
+        let (send_done, done) = sync_channel(0);
+        // Both fail only if the thread is gone, which starting it tells.
+        let _ = self.send.send(Order::GiveUpRights(keep, send_done));
+        let _ = done.recv();
+    }
+
+    /// Has it hear stops.
+    ///
+    /// # Errors
+    /// What the system says to the second thread, or to signals of the first.
+    pub(crate) fn start(self, socket: StopSocket, urgent: Urgent, is_quiet: bool) -> io::Result<()> {
+        let queue = Queue::start(socket.drain()?)?;
+        let stops = Stops { socket, queue, urgent, is_quiet };
+        let _ = self.send.send(Order::Run(Box::new(stops)));
+        // The sandbox that is shut next knows nothing of the calls by which threads begin.
+        self.begun.recv().unwrap_or_else(|_| Err(ended()))
+    }
+}
+
+fn ended() -> io::Error {
+    io::Error::other("it ended at once")
+}
+
+impl Stops {
+    fn hear(self) {
+        let Self { mut socket, mut queue, urgent, is_quiet } = self;
+        loop {
+            let may_take = queue.is_taken();
+            // A signal interrupts, which is no failure; of any other one the rest is a slower turn.
+            if let Ok(user) = socket.hear() {
+                let is_new = urgent.stop(user, monotonic_ns());
+                if may_take {
+                    queue.take();
+                }
+                if is_new && !is_quiet {
+                    let user = user.map_or("an unknown user".into(), |user| format!("user {user}"));
+                    say(format_args!("io-driver: emergency stop, asked for by {user} by datagram"));
+                }
+                switch_off_if_unheard(&urgent);
             }
-            switch_off_if_unheard(urgent);
+            std::thread::sleep(REST);
         }
-        std::thread::sleep(REST);
     }
 }
 

@@ -266,7 +266,7 @@ impl<'a> TableReader<'a> {
         value.ok_or_else(|| TableError::BadCell {
             at: self.place(line, column),
             found: quote(cell),
-            allowed: allowed.to_string(),
+            allowed: format!("{allowed}{}", separators::hint_for_half_a_cell(cell)),
         })
     }
 

@@ -15,7 +15,7 @@ pub fn mistaken(begin: &[u8]) -> Option<&'static str> {
     KINDS.iter().find(is_kind).map(|(_, words)| *words)
 }
 
-const KINDS: [(&[u8], &str); 9] = [
+const KINDS: [(&[u8], &str); 12] = [
     (b"\x1f\x8b", "it is compressed by gzip; unpack it with gunzip"),
     (b"\xfd7zXZ\0", "it is compressed by xz; unpack it with unxz"),
     (b"BZh", "it is compressed by bzip2; unpack it with bunzip2"),
@@ -28,9 +28,14 @@ const KINDS: [(&[u8], &str); 9] = [
     (b"<!DOCTYPE html", WEB_PAGE),
     (b"<html", WEB_PAGE),
     (b"%PDF-", "it is a PDF document; name the file itself"),
+    (b"\x89PNG", PICTURE),
+    (b"\xff\xd8\xff", PICTURE),
+    (b"GIF8", PICTURE),
 ];
 
 const WEB_PAGE: &str = "it is a page of the web; download the file that the page shows";
+
+const PICTURE: &str = "it is a picture; name the file itself";
 
 #[cfg(test)]
 mod tests {

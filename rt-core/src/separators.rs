@@ -62,6 +62,12 @@ pub fn hint_for_cell(cell: &str) -> &'static str {
     if cell.contains(is_comma) && number.parse::<f64>().is_ok() { DECIMAL_POINT } else { "" }
 }
 
+/// What to say of a cell that is half of one in quotes.
+pub fn hint_for_half_a_cell(cell: &str) -> &'static str {
+    let number = cell.strip_prefix('"').or_else(|| cell.strip_suffix('"'));
+    if number.is_some_and(|number| number.parse::<f64>().is_ok()) { DECIMAL_POINT } else { "" }
+}
+
 const DECIMAL_POINT: &str = "; a decimal number has a point, as in 0.1";
 
 #[cfg(test)]
@@ -115,6 +121,14 @@ mod tests {
         }
         for other in ["", ",", "0.5", "a,b", "1,2,3", "x"] {
             assert_eq!(hint_for_cell(other), "", "{other:?}");
+        }
+        // Of `"0,05"`, which is one cell elsewhere.
+        assert!(
+            hint_for_half_a_cell("\"0").contains("a point")
+                && hint_for_half_a_cell("05\"").contains("a point")
+        );
+        for other in ["", "\"", "0", "\"a", "a"] {
+            assert_eq!(hint_for_half_a_cell(other), "", "{other:?}");
         }
     }
 }

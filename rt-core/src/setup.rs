@@ -22,7 +22,7 @@ mod report;
 pub(crate) mod scheduling;
 
 pub use report::{Guarantee, SetupReport};
-pub use scheduling::PromotedChildren;
+pub use scheduling::promote_beside;
 
 use std::fs::File;
 

@@ -11,7 +11,10 @@ pub fn explain(text: &str, offset: usize, said: &str) -> String {
     let (Some(before), Some(rest)) = (text.get(..offset), text.get(offset..)) else { return said };
     let before = before.rsplit('\n').next().unwrap_or_default();
     let rest = rest.split(['\n', '\r']).next().unwrap_or_default();
-    word_without_quotes(before, rest)
+    nothing(before, rest)
+        .map(str::to_owned)
+        .or_else(|| foreign_comment(before, rest).map(str::to_owned))
+        .or_else(|| word_without_quotes(before, rest))
         .or_else(|| number_with_unit(before, rest))
         .or_else(|| typographic_minus(before, rest))
         .or_else(|| expression(before, rest))
@@ -32,6 +35,25 @@ pub fn single_table(key: &str) -> [String; 2] {
 /// What a list of tables is.
 pub fn tables(key: &str) -> String {
     format!("a list of tables, each under its own [[{key}]]")
+}
+
+/// `radius_m =`
+fn nothing(before: &str, rest: &str) -> Option<&'static str> {
+    let is_nothing =
+        before.trim_end().ends_with('=') && rest.split('#').next().is_some_and(|rest| rest.trim().is_empty());
+    is_nothing.then_some("found nothing behind =; allowed: a value")
+}
+
+/// `; words`, `// words`, and `name: table`
+fn foreign_comment(before: &str, rest: &str) -> Option<&'static str> {
+    let line = [before, rest].concat();
+    let line = line.trim_start();
+    if line.starts_with(';') || line.starts_with("//") {
+        return Some("a comment begins with #");
+    }
+    let (key, _) = line.split_once(':')?;
+    let is_key = !key.is_empty() && key.chars().all(|c| c.is_ascii_alphanumeric() || c == '_' || c == '-');
+    is_key.then_some("between a key and its value stands =, as in name = \"table\"")
 }
 
 /// `name = table`
@@ -233,6 +255,22 @@ mod tests {
         }
         for other in ["x = 1/a", "x = ./3", "x = \u{2212}", "x = \u{2212}y", "1/3"] {
             assert_eq!(explain(other, other.len(), string), string, "{other}");
+        }
+    }
+
+    #[test]
+    fn nothing_comments_and_colons_of_other_languages_are_told_with_what_to_write() {
+        let string = "string values must be quoted, expected literal string";
+        for text in ["x = ", "x =", "x =   # later"] {
+            assert_eq!(explain(text, 3.min(text.len()), string), "found nothing behind =; allowed: a value");
+        }
+        let key = "key with no value, expected `=`";
+        for text in ["; my scene", "// my scene", "  // x = 1"] {
+            assert_eq!(explain(text, text.len(), key), "a comment begins with #", "{text}");
+        }
+        assert!(explain("name: \"table\"", 4, key).ends_with("as in name = \"table\""));
+        for text in ["x = 12:30", "a b", "x = [1, 2] ; y"] {
+            assert_eq!(explain(text, text.len(), key), key, "{text}");
         }
     }
 

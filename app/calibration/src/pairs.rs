@@ -98,7 +98,13 @@ fn has_decimal_commas(line: &str) -> bool {
     } else {
         line.split_whitespace().collect()
     };
-    cells.len() == 6 && cells.iter().all(|cell| parse_cell(&cell.replacen(',', ".", 1)).is_some())
+    if cells.len() == 6 {
+        return cells.iter().all(|cell| parse_cell(&cell.replacen(',', ".", 1)).is_some());
+    }
+    // Or commas between columns as well, and no point anywhere.
+    let parts: Vec<&str> = line.split(',').map(str::trim).collect();
+    let is_whole_part = |part: &&str| part.trim_start_matches(['+', '-']).parse::<u64>().is_ok();
+    (8..=12).contains(&parts.len()) && parts.iter().all(is_whole_part)
 }
 
 /// Names, none of which is a number: half a header is a broken row.

@@ -18,6 +18,7 @@ pub(super) fn all(rig: &Rig, measures: &[Measures]) -> Vec<String> {
     found.extend(densities(&rig.scene));
     found.extend(far(rig, measures));
     found.extend(fingers(&rig.scene));
+    found.extend(starts(&rig.scene));
     found.extend(of_the_hand(rig));
     found.extend(devices(rig));
     found.extend(rates(&rig.scene));
@@ -157,6 +158,20 @@ fn fingers(scene: &Scene) -> Vec<String> {
             "finger {} has a radius of {} m; if millimetres were meant, write {instead}",
             finger.name,
             short(radius_m)
+        )
+    });
+    told.collect()
+}
+
+/// Fingers that begin where no arm reaches.
+fn starts(scene: &Scene) -> Vec<String> {
+    let far = scene.fingers.iter().filter(|finger| finger.start_m.coords.amax() > FAR_M);
+    let told = far.map(|finger| {
+        let [x, y, z] = finger.start_m.coords.map(short).into();
+        format!(
+            "finger {} begins at ({x}, {y}, {z}) m, farther than an arm reaches; places are in metres: if millimetres were \
+             meant, divide them by 1000",
+            finger.name
         )
     });
     told.collect()

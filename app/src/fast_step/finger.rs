@@ -3,7 +3,7 @@
 #![allow(non_snake_case)] // Frames are capital letters.
 
 use super::Objects;
-use super::near::Near;
+use super::near::{Near, Room};
 use crate::mount::Mount;
 use crate::row::FingerRow;
 use haptics::{Contact, Door, Effects, Entity, Finger, FingerEffects, FrictionState, Hip, Moment, Passage};
@@ -77,10 +77,12 @@ impl DeviceFinger {
         let step = |finger: &mut Finger| {
             let from = finger.last_hip_W().unwrap_or(hip);
             let around = (objects.broad_phase(), entities);
-            // What is touched keeps its slot, near or not.
-            let others = finger.contacts().filter(|contact| !near.has(contact.entity)).count();
-            let most = finger.capacity().saturating_sub(others);
-            let near = near.update(around, (finger.space(), most), &from, &hip, finger.radius_m());
+            let room = Room {
+                slots: finger.capacity(),
+                touched: finger.contacts().count(),
+                is_touched: |entity| finger.contacts().any(|contact| contact.entity == entity as usize),
+            };
+            let near = near.update(around, (finger.space(), &room), &from, &hip, finger.radius_m());
             finger.step_near(entities, near, Hip { position_W: hip, velocity_W }, dt_s)
         };
         let moves = |entity| objects.manipulation().is_body(entity);

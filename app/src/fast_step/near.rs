@@ -22,6 +22,26 @@ pub(super) struct Near {
     is_crowded: bool,
 }
 
+/// Slots of a finger. What is touched keeps its own, near or not.
+pub(super) struct Room<F> {
+    pub(super) slots: usize,
+    /// Number of touched entities.
+    pub(super) touched: usize,
+    pub(super) is_touched: F,
+}
+
+impl<F: Fn(u32) -> bool> Room<F> {
+    /// How many of these and of those that are touched there are beyond its slots.
+    fn excess(&self, found: &[u32]) -> usize {
+        let most = found.len() + self.touched;
+        if most <= self.slots {
+            return 0;
+        }
+        let both = found.iter().filter(|&&entity| (self.is_touched)(entity)).count();
+        (most - both).saturating_sub(self.slots)
+    }
+}
+
 /// Where entities were looked for.
 #[derive(Debug)]
 struct Looked {
@@ -54,16 +74,12 @@ impl Near {
         self.is_crowded
     }
 
-    /// Whether an entity was found in the last tick.
-    pub(super) fn has(&self, entity: usize) -> bool {
-        u32::try_from(entity).is_ok_and(|entity| self.entities.binary_search(&entity).is_ok())
-    }
-
-    /// What is near a finger of this radius (m), and in its space, that has come from there to here: at most so many.
+    /// What is near a finger of this radius (m), and in its space, that has come from there to here: no more than it has
+    /// room for.
     pub(super) fn update(
         &mut self,
         of: (&BroadPhase, &[Entity]),
-        (space, most): (u32, usize),
+        (space, room): (u32, &Room<impl Fn(u32) -> bool>),
         from_W: &Vector3<f64>,
         to_W: &Vector3<f64>,
         radius_m: f64,
@@ -75,11 +91,13 @@ impl Near {
                 && looked.around.contains(&way.grown(looked.least_m))
         };
         self.is_crowded = false;
-        if self.entities.len() > most || !self.looked.as_ref().is_some_and(is_known) {
-            self.looked = self.look(of, (space, most), &way);
-            if self.entities.len() > most {
+        if room.excess(&self.entities) > 0 || !self.looked.as_ref().is_some_and(is_known) {
+            self.looked = self.look(of, (space, room), &way);
+            let excess = room.excess(&self.entities);
+            if excess > 0 {
                 self.is_crowded = true;
-                self.keep_nearest(of.1, most, to_W);
+                let most = self.entities.len().saturating_sub(excess);
+                self.keep_nearest(of.1, (most, &room.is_touched), to_W);
             }
         }
         &self.entities
@@ -89,7 +107,7 @@ impl Near {
     fn look(
         &mut self,
         (broad_phase, entities): (&BroadPhase, &[Entity]),
-        (space, most): (u32, usize),
+        (space, room): (u32, &Room<impl Fn(u32) -> bool>),
         way: &Aabb,
     ) -> Option<Looked> {
         let mut find = |around: &Aabb, is_tight: bool| {
@@ -106,11 +124,11 @@ impl Near {
                 }
             });
             found.sort_unstable();
-            found.len()
+            room.excess(found)
         };
         for around_m in AROUND_M {
             let around = way.grown(around_m);
-            if find(&around, false) <= most {
+            if find(&around, false) == 0 {
                 let least_m = LEAST * around_m;
                 return Some(Looked { around, least_m, version: broad_phase.version(), space });
             }
@@ -120,10 +138,18 @@ impl Near {
     }
 
     /// All are at the finger's place by their boxes.
-    fn keep_nearest(&mut self, entities: &[Entity], most: usize, hip_W: &Vector3<f64>) {
+    fn keep_nearest(
+        &mut self,
+        entities: &[Entity],
+        (most, is_touched): (usize, &impl Fn(u32) -> bool),
+        hip_W: &Vector3<f64>,
+    ) {
         let Self { entities: found, distances, .. } = self;
         let distance_m = |entity: u32| {
-            // What has no end comes first.
+            if is_touched(entity) {
+                return -2.0;
+            }
+            // What has no end comes first of the others.
             let tight = entities.get(entity as usize).and_then(Aabb::of_entity);
             tight.map_or(-1.0, |tight| (tight.middle_W() - hip_W).norm())
         };
@@ -152,6 +178,11 @@ mod tests {
         entities
     }
 
+    /// Of a finger that touches nothing.
+    fn slots(slots: usize) -> Room<fn(u32) -> bool> {
+        Room { slots, touched: 0, is_touched: |_| false }
+    }
+
     fn at(x: f64) -> Vector3<f64> {
         Vector3::new(x, 0.0, 0.0)
     }
@@ -161,15 +192,18 @@ mod tests {
         let entities = entities();
         let broad_phase = BroadPhase::new(&entities);
         let mut near = Near::new(11);
-        assert_eq!(near.update((&broad_phase, &entities), (0, 11), &at(0.05), &at(0.05), 0.0), [0]);
-        assert_eq!(near.update((&broad_phase, &entities), (0, 11), &at(0.05), &at(0.075), 0.0), [0, 2]);
+        assert_eq!(near.update((&broad_phase, &entities), (0, &slots(11)), &at(0.05), &at(0.05), 0.0), [0]);
         assert_eq!(
-            near.update((&broad_phase, &entities), (0, 11), &at(0.075), &at(0.375), 0.0),
+            near.update((&broad_phase, &entities), (0, &slots(11)), &at(0.05), &at(0.075), 0.0),
+            [0, 2]
+        );
+        assert_eq!(
+            near.update((&broad_phase, &entities), (0, &slots(11)), &at(0.075), &at(0.375), 0.0),
             [0, 2, 3, 4, 5],
             "a leap"
         );
         assert_eq!(
-            near.update((&broad_phase, &entities), (0, 11), &at(0.55), &at(0.55), 0.03),
+            near.update((&broad_phase, &entities), (0, &slots(11)), &at(0.55), &at(0.55), 0.03),
             [0, 6, 7],
             "a ball of 30 mm"
         );
@@ -190,7 +224,7 @@ mod tests {
         for most in [5, 20, 128] {
             for at in 0..441 {
                 let hip = place(at);
-                let found = near.update((&broad_phase, &entities), (0, most), &hip, &hip, 0.0);
+                let found = near.update((&broad_phase, &entities), (0, &slots(most)), &hip, &hip, 0.0);
                 assert!(
                     found.contains(&at) && found.contains(&441) && found.len() <= most,
                     "{at} of {most}: {found:?}"
@@ -198,12 +232,30 @@ mod tests {
             }
         }
         assert!(!near.is_crowded());
-        let found = near.update((&broad_phase, &entities), (0, 1), &place(7), &place(7), 0.0);
+        let found = near.update((&broad_phase, &entities), (0, &slots(1)), &place(7), &place(7), 0.0);
         assert_eq!(found, [441], "what has no end, of two at one place");
         assert!(near.is_crowded());
-        let found = near.update((&broad_phase, &entities), (0, 2), &place(7), &place(7), 0.0);
+        let found = near.update((&broad_phase, &entities), (0, &slots(2)), &place(7), &place(7), 0.0);
         assert_eq!(found, [7, 441]);
         assert!(!near.is_crowded());
+    }
+
+    /// What is touched is there with its box or without, and takes one slot.
+    #[test]
+    fn what_is_touched_crowds_nobody_out_when_it_is_near_again() {
+        let entities = entities();
+        let broad_phase = BroadPhase::new(&entities);
+        let mut near = Near::new(11);
+        let room = Room { slots: 2, touched: 1, is_touched: |entity| entity == 4 };
+        for (x_m, found) in [(0.55, &[0][..]), (0.3, &[0, 4]), (0.55, &[0])] {
+            assert_eq!(near.update((&broad_phase, &entities), (0, &room), &at(x_m), &at(x_m), 0.0), found);
+            assert!(!near.is_crowded(), "{x_m}");
+        }
+        // There is another one, and the touched one has its slot already.
+        assert_eq!(near.update((&broad_phase, &entities), (0, &room), &at(0.4), &at(0.4), 0.0), [0]);
+        assert!(near.is_crowded());
+        let room = Room { slots: 1, ..room };
+        assert_eq!(near.update((&broad_phase, &entities), (0, &room), &at(0.3), &at(0.3), 0.0), [4]);
     }
 
     /// A finger of 20 mm on the same dots, more of which its box overlaps than it has room for.
@@ -217,7 +269,7 @@ mod tests {
         let mut near = Near::new(40);
         for middle in 4..36 {
             let hip = at(x_m(middle) + 1e-4);
-            let found = near.update((&broad_phase, &entities), (0, 5), &hip, &hip, 0.02);
+            let found = near.update((&broad_phase, &entities), (0, &slots(5)), &hip, &hip, 0.02);
             assert_eq!(found, [middle - 2, middle - 1, middle, middle + 1, middle + 2]);
             assert!(near.is_crowded());
         }
@@ -228,10 +280,13 @@ mod tests {
         let mut entities = entities();
         let mut broad_phase = BroadPhase::new(&entities);
         let mut near = Near::new(11);
-        assert_eq!(near.update((&broad_phase, &entities), (0, 11), &at(0.05), &at(0.05), 0.0), [0]);
+        assert_eq!(near.update((&broad_phase, &entities), (0, &slots(11)), &at(0.05), &at(0.05), 0.0), [0]);
         entities[10].move_to(Isometry3::translation(0.05, 0.03, 0.0));
         broad_phase.moved(10, &entities[10], &Vector3::zeros());
-        assert_eq!(near.update((&broad_phase, &entities), (0, 11), &at(0.05), &at(0.05), 0.0), [0, 10]);
+        assert_eq!(
+            near.update((&broad_phase, &entities), (0, &slots(11)), &at(0.05), &at(0.05), 0.0),
+            [0, 10]
+        );
     }
 
     #[test]
@@ -240,7 +295,10 @@ mod tests {
         entities[1] = entities[1].clone().without_fingers();
         let broad_phase = BroadPhase::new(&entities);
         let mut near = Near::new(11);
-        assert_eq!(near.update((&broad_phase, &entities), (0, 11), &at(0.05), &at(0.06), 0.03), [0, 2]);
+        assert_eq!(
+            near.update((&broad_phase, &entities), (0, &slots(11)), &at(0.05), &at(0.06), 0.03),
+            [0, 2]
+        );
     }
 
     #[test]
@@ -249,8 +307,9 @@ mod tests {
         entities[1] = entities[1].clone().within(1);
         let broad_phase = BroadPhase::new(&entities);
         let mut near = Near::new(11);
-        let mut update =
-            |space| near.update((&broad_phase, &entities), (space, 11), &at(0.05), &at(0.06), 0.03).to_vec();
+        let mut update = |space| {
+            near.update((&broad_phase, &entities), (space, &slots(11)), &at(0.05), &at(0.06), 0.03).to_vec()
+        };
         assert_eq!((update(0), update(1)), (vec![0, 2], vec![1]), "from one tick to the next");
     }
 }

@@ -3,7 +3,7 @@
 use std::io;
 use std::path::Path;
 
-use rt_core::input_file;
+use rt_core::{file_kind, input_file};
 
 use crate::SceneError;
 use crate::document::line_of;
@@ -17,6 +17,9 @@ pub(crate) fn read_text(file: &Path) -> Result<String, SceneError> {
     let bytes = input_file::read(file, MAX_FILE_BYTES).map_err(|cause| unreadable(file, cause))?;
     if input_file::is_utf16(&bytes) {
         return Err(unreadable(file, io::Error::new(io::ErrorKind::InvalidData, input_file::UTF16)));
+    }
+    if let Some(words) = file_kind::mistaken(&bytes) {
+        return Err(unreadable(file, io::Error::new(io::ErrorKind::InvalidData, words)));
     }
     String::from_utf8(bytes).map_err(|error| {
         let offset_bytes = error.utf8_error().valid_up_to();

@@ -2,7 +2,7 @@
 
 use super::limits::raise_soft_limit;
 use super::report::Guarantee;
-use crate::sys::sched::{Policy, current_policy, set, set_fifo};
+use crate::sys::sched::{Policy, current_policy, set_fifo};
 use nix::Result;
 use nix::errno::Errno;
 use nix::sys::resource::Resource;
@@ -31,29 +31,9 @@ pub(crate) fn promote(priority: u8) -> Promotion {
     Promotion { asked, found: current_policy(), rtprio_limit }
 }
 
-/// While this lives, threads that the calling thread starts are `SCHED_FIFO`, if the system lets them: for threads beside a
-/// loop that sleep nearly always, and must not be starved by others when they are needed. They keep the policy when the
-/// process gives up its rights.
-pub struct PromotedChildren {
-    /// The thread's own policy, if it was promoted.
-    before: Option<Policy>,
-}
-
-impl PromotedChildren {
-    /// Promotes the calling thread, from which they inherit. A loop that gets no real time itself has told so.
-    pub fn begin(priority: u8) -> Self {
-        raise_soft_limit(Resource::RLIMIT_RTPRIO);
-        let before = current_policy().ok();
-        let fifo = Policy { policy: libc::SCHED_FIFO, priority: i32::from(priority) };
-        Self { before: before.filter(|_| set(fifo).is_ok()) }
-    }
-}
-
-impl Drop for PromotedChildren {
-    fn drop(&mut self) {
-        // No right is needed for less.
-        let _ = self.before.map(set);
-    }
+/// Promotes a thread beside a loop that sleeps nearly always, and must not be starved by others when it is needed.
+pub fn promote_beside(name: &'static str, priority: u8) -> Guarantee {
+    Guarantee { name, ..make_fifo(priority) }
 }
 
 pub(crate) fn judge_fifo(

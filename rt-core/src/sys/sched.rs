@@ -17,15 +17,9 @@ pub(crate) struct Policy {
 /// A thread that inherited the priority would preempt the very loop that started it, hence
 /// `SCHED_RESET_ON_FORK`.
 pub(crate) fn set_fifo(priority: u8) -> Result<()> {
-    let policy = libc::SCHED_FIFO | libc::SCHED_RESET_ON_FORK;
-    set(Policy { policy, priority: i32::from(priority) })
-}
-
-/// Gives the calling thread a policy, which threads and processes that it starts inherit.
-pub(crate) fn set(Policy { policy, priority }: Policy) -> Result<()> {
-    let param = libc::sched_param { sched_priority: priority };
+    let param = libc::sched_param { sched_priority: i32::from(priority) };
     // SAFETY: `param` outlives the call, which only reads it; 0 names the calling thread.
-    let result = unsafe { libc::sched_setscheduler(0, policy, &param) };
+    let result = unsafe { libc::sched_setscheduler(0, libc::SCHED_FIFO | libc::SCHED_RESET_ON_FORK, &param) };
     Errno::result(result).map(drop)
 }
 

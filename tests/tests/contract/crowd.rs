@@ -115,6 +115,21 @@ fn a_floor_of_tiles_is_felt_tile_by_tile() {
     }
 }
 
+/// The finger is held by the plate while it is out of its box, and when it comes back.
+#[test]
+fn a_thing_that_a_finger_is_pushed_through_is_no_crowd() {
+    let place = Workplace::new();
+    let plate = "[[finger]]\n[[entity]]\nshape = { kind = \"box\", size_m = [0.1, 0.01, 0.1] }\n";
+    place.write("scene.toml", plate);
+    place.write(
+        "hand.csv",
+        hand([0.05, -0.05, 0.05].into_iter().enumerate().map(|(k, y)| (k as f64, [0.0, y, 0.0]))),
+    );
+    let said = place.run(["run", "scene.toml", "--hand", "hand.csv", "--clock", "virtual", "--headless"]);
+    assert_eq!(said.status, Some(0), "{}", said.err);
+    assert!(said.out.contains("1 contacts") && !said.out.contains("crowded"), "{}", said.out);
+}
+
 /// All at one place: nobody can look at them all within a tick. The finger comes into all of their boxes, and touches none.
 #[test]
 fn a_crowd_that_is_too_large_is_told_and_what_has_no_end_is_felt_in_it() {

@@ -5,7 +5,7 @@ use rustix::process::{Pid, Signal, kill_process};
 use shm_abi::{FaultReason, stop_socket};
 use std::ffi::OsStr;
 use std::path::Path;
-use std::process::Command;
+use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
 use system_tests::driver::{Driver, HANG, resting};
 use system_tests::faults::process::{self, End, Running};
@@ -189,14 +189,48 @@ fn a_run_at_a_driver_in_its_fault_state_names_the_fault_and_the_command_that_lea
     assert_eq!(stop.status, Some(0), "{stop:?}");
     let place = Workplace::new();
     place.write("scene.toml", "[[finger]]\n");
+    for name in ["old.csv", "old.jsonl"] {
+        place.write(name, "earlier");
+    }
+    let outputs = ["--record", "old.csv", "--events", "old.jsonl"];
     let run = ["run", "scene.toml", "--seconds", "1", "--attach"].map(OsStr::new);
-    let said = place.run(run.into_iter().chain([driver.socket().as_os_str()]));
+    let run = run.into_iter().chain([driver.socket().as_os_str()]).chain(outputs.map(OsStr::new));
+    let said = place.run(run);
     assert_eq!(said.status, Some(3), "{said:?}");
     let command = format!("`io-driver clear-fault --socket {}`", driver.socket().display());
     for words in ["an emergency stop was pressed; the motors are off; find the cause, then", &command] {
         assert!(said.err.contains(words), "{words}: {}", said.err);
     }
     assert_eq!(said.out, "", "there is nothing to report");
+    for name in ["old.csv", "old.jsonl"] {
+        assert_eq!(std::fs::read(place.path(name)).expect("it is there"), b"earlier", "{name}");
+    }
+}
+
+#[test]
+fn a_run_whose_recording_nobody_reads_tells_at_once_why_it_ended() {
+    let driver = Driver::start(&resting("real", 1));
+    let place = Workplace::new();
+    place.write("scene.toml", "[[finger]]\n");
+    let words = place.path("words.txt");
+    let mut run = place.phantom3();
+    run.args(["run", "scene.toml", "--seconds", "600", "--record", "-", "--record", "r.csv", "--attach"])
+        .arg(driver.socket());
+    run.stdout(Stdio::piped()).stderr(std::fs::File::create(&words).expect("a file"));
+    let mut run = run.spawn().expect("it starts");
+    let observer = driver.observe();
+    // A pipe holds 64 KiB, which is a fifth of that.
+    wait_for(|| observer.driver.read_latest().filter(|frame| frame.run_tick > 1000));
+    let stop = asked(&driver, "emergency-stop");
+    assert_eq!(stop.status, Some(0), "{stop:?}");
+    let told = || std::fs::read_to_string(&words).expect("its words");
+    patience::until("the reason", || told().contains("an emergency stop was pressed"));
+    assert!(run.try_wait().expect("our child").is_none(), "it waits for its reader: {}", told());
+    // Which the other recording does not.
+    let rows = || std::fs::read_to_string(place.path("r.csv")).expect("a recording").lines().count();
+    patience::until("the rows", || rows() > 1000);
+    drop(run.stdout.take());
+    assert_eq!(run.bounded_wait().code(), Some(3), "{}", told());
 }
 
 /// Clocks of time namespaces differ by as much as somebody says.

@@ -123,6 +123,8 @@ fn policy_of(process: u32, name: &str) -> Option<[u64; 2]> {
 /// Ordinary threads wait for those of real time on all CPUs: the thread that takes stops is none, unlike the service.
 fn check_stops_are_real_time(driver: &Driver) {
     let process = driver.child.id();
+    let report = driver.observe().driver.info().setup_report;
+    assert!(report.contains("obtained  stops: SCHED_FIFO 1\n"), "{report}");
     assert_eq!(policy_of(process, "stop"), Some([1, 1]));
     let name = std::fs::read_to_string(format!("/proc/{process}/comm")).expect("it lives");
     assert_eq!(policy_of(process, name.trim_end()), Some([0, 0]));

@@ -181,7 +181,17 @@ impl Document {
         serde_json::from_slice(text).map_err(|error| {
             let said = error.to_string();
             let said = said.split(" at line ").next().unwrap_or_default();
-            let found: String = said.escape_default().take(LONGEST_WORDS).collect();
+            let (what, expected) = said.rsplit_once(", expected ").unwrap_or((said, ""));
+            let expected = match expected {
+                "" => String::new(),
+                "usize" | "u64" | "u32" => ", expected a whole number, 0 or more".into(),
+                "f64" | "f32" => ", expected a number".into(),
+                "a sequence" => ", expected a list".into(),
+                other => format!(", expected {other}"),
+            };
+            let what = what.replacen("invalid type: ", "", 1).replacen("map", "an object", 1);
+            let found: String = format!("{what}{expected}").escape_default().take(LONGEST_WORDS).collect();
+            let found = found.replace("\\\"", "\"");
             let other = || ModelError::Line {
                 line: error.line(),
                 found,

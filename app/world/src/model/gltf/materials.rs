@@ -12,8 +12,8 @@ use serde_json::Value;
 use super::buffers::Buffers;
 use super::document::{Document, Material};
 use crate::model::appearance::Finish;
-use crate::model::shown;
 use crate::model::texture::{ALLOWED, Texture, Wrap};
+use crate::model::{ModelError, shown};
 
 /// The finishes of a file's materials, and one more for faces of none.
 pub(super) struct Materials {
@@ -22,6 +22,8 @@ pub(super) struct Materials {
     lies: Vec<Option<Lie>>,
     pub(super) unread: Vec<String>,
     texels_left: usize,
+    /// The pictures together are too much: why, and how many more there are.
+    excess: Option<(String, usize)>,
 }
 
 /// Of all pictures of a file together: half a gigabyte.
@@ -123,8 +125,13 @@ fn element<T: DeserializeOwned + Default>(list: &Value, index: usize) -> T {
 
 impl Materials {
     pub(super) fn read(document: &Document, buffers: &mut Buffers<'_>) -> Self {
-        let mut read =
-            Self { finishes: Vec::new(), lies: Vec::new(), unread: Vec::new(), texels_left: MOST_TEXELS };
+        let mut read = Self {
+            finishes: Vec::new(),
+            lies: Vec::new(),
+            unread: Vec::new(),
+            texels_left: MOST_TEXELS,
+            excess: None,
+        };
         let mut images = Vec::new();
         for material in &document.materials {
             let pbr = Pbr::deserialize(&material.pbr_metallic_roughness).unwrap_or_default();
@@ -139,6 +146,13 @@ impl Materials {
             read.lies.push(lie);
         }
         read.finishes.push(Finish::default());
+        if let Some((why, more)) = read.excess.take() {
+            read.unread.push(if more == 0 {
+                why
+            } else {
+                format!("{why}; {more} more pictures are left out")
+            });
+        }
         read
     }
 
@@ -180,6 +194,11 @@ impl Materials {
         if let Some((.., known)) = images.iter().find(is_it) {
             return known.clone();
         }
+        if let Some((_, more)) = &mut self.excess {
+            *more += 1;
+            images.push((origin, wraps, mode, None));
+            return None;
+        }
         let bytes = match &origin {
             Origin::Uri(uri) => buffers.of_uri(uri, &place),
             Origin::View(view) => buffers.of_view(document, *view).map(<[u8]>::to_vec),
@@ -189,6 +208,11 @@ impl Materials {
             Origin::Uri(uri) if !uri.starts_with("data:") => format!("{place} ({})", shown(uri.as_bytes())),
             _ => place.clone(),
         };
+        if let Err(ModelError::TooLarge { limit_bytes }) = bytes {
+            let why = format!("{named}: found more than {limit_bytes} bytes in all files; allowed: so many");
+            self.excess = Some((why, 0));
+            return None;
+        }
         let read = bytes.map_err(|error| error.to_string()).and_then(|bytes| {
             Texture::read(&bytes).map_err(|found| format!("{named}: found {found}; allowed: {ALLOWED}"))
         });
@@ -197,16 +221,20 @@ impl Materials {
             Mode::Clear => texture.cleared(None),
             Mode::Cut(cutoff) => texture.cleared(Some(cutoff)),
         });
+        let read = read.map_err(|said| self.unread.push(said)).ok();
         let read = read.and_then(|texture| match self.texels_left.checked_sub(texture.texels.len()) {
             Some(left) => {
                 self.texels_left = left;
-                Ok(texture)
+                Some(texture)
             }
-            None => Err(format!(
-                "{place}: found more than {MOST_TEXELS} places in all pictures; allowed: so many"
-            )),
+            None => {
+                let why = format!(
+                    "{named}: found more than {MOST_TEXELS} places in all pictures; allowed: so many"
+                );
+                self.excess = Some((why, 0));
+                None
+            }
         });
-        let read = read.map_err(|said| self.unread.push(said)).ok();
         let texture = read.map(|texture| Arc::new(Texture { wraps, ..texture }));
         images.push((origin, wraps, mode, texture.clone()));
         texture
