@@ -15,7 +15,14 @@ pub fn mistaken(begin: &[u8]) -> Option<&'static str> {
     KINDS.iter().find(is_kind).map(|(_, words)| *words)
 }
 
-const KINDS: [(&[u8], &str); 12] = [
+/// The same where no picture can be meant either.
+pub fn mistaken_for_text(begin: &[u8]) -> Option<&'static str> {
+    let pictures: [&[u8]; 3] = [b"\x89PNG", b"\xff\xd8\xff", b"GIF8"];
+    let is_picture = pictures.iter().any(|kind| begin.starts_with(kind));
+    mistaken(begin).or_else(|| is_picture.then_some("it is a picture; name the file itself"))
+}
+
+const KINDS: [(&[u8], &str); 9] = [
     (b"\x1f\x8b", "it is compressed by gzip; unpack it with gunzip"),
     (b"\xfd7zXZ\0", "it is compressed by xz; unpack it with unxz"),
     (b"BZh", "it is compressed by bzip2; unpack it with bunzip2"),
@@ -28,14 +35,9 @@ const KINDS: [(&[u8], &str); 12] = [
     (b"<!DOCTYPE html", WEB_PAGE),
     (b"<html", WEB_PAGE),
     (b"%PDF-", "it is a PDF document; name the file itself"),
-    (b"\x89PNG", PICTURE),
-    (b"\xff\xd8\xff", PICTURE),
-    (b"GIF8", PICTURE),
 ];
 
 const WEB_PAGE: &str = "it is a page of the web; download the file that the page shows";
-
-const PICTURE: &str = "it is a picture; name the file itself";
 
 #[cfg(test)]
 mod tests {
@@ -47,6 +49,8 @@ mod tests {
         assert!(mistaken(pointer).is_some_and(|words| words.contains("git lfs pull")));
         assert!(mistaken(b"\x1f\x8b\x08").is_some_and(|words| words.contains("gunzip")));
         assert!(mistaken(b"<!doctype HTML><title>").is_some_and(|words| words.contains("page")));
+        assert_eq!(mistaken(b"\x89PNG\r\n"), None);
+        assert!(mistaken_for_text(b"\x89PNG\r\n").is_some_and(|words| words.contains("picture")));
         assert!(KINDS.iter().all(|(kind, _)| kind.len() <= BEGIN_BYTES));
         for other in [&b""[..], b"\x1f", b"PK", b"version 1", b"v 0 0 0\n", b"solid PK\x03\x04"] {
             assert_eq!(mistaken(other), None, "{}", other.escape_ascii());

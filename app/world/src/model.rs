@@ -56,6 +56,9 @@ use std::path::{Path, PathBuf};
 /// wrong file ends in a message.
 pub const MAX_MODEL_BYTES: u64 = 1 << 30;
 
+/// Enough of a text to know how its lines end.
+const BEGIN_BYTES: usize = 1 << 16;
+
 /// Why a model file was refused. The file itself is named by whoever asked for it.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
@@ -300,6 +303,10 @@ fn format(file: &Path, bytes: &[u8]) -> Result<Format, ModelError> {
     if input_file::is_utf16(bytes) && !matches!(format, Format::Stl | Format::ThreeDs) {
         let cause = io::Error::new(io::ErrorKind::InvalidData, input_file::UTF16);
         return Err(ModelError::Unreadable(cause));
+    }
+    let begin = bytes[..bytes.len().min(BEGIN_BYTES)].utf8_chunks().next().map_or("", |chunk| chunk.valid());
+    if let Some(words) = separators::mistaken_ends(begin).filter(|_| format == Format::Obj) {
+        return Err(ModelError::Unreadable(io::Error::new(io::ErrorKind::InvalidData, words)));
     }
     let looks_like_it = LOOKS.iter().any(|(looks, of)| *of == format && looks(bytes));
     match Format::by_content(bytes) {

@@ -18,7 +18,7 @@ pub(crate) fn read_text(file: &Path) -> Result<String, SceneError> {
     if input_file::is_utf16(&bytes) {
         return Err(unreadable(file, io::Error::new(io::ErrorKind::InvalidData, input_file::UTF16)));
     }
-    if let Some(words) = file_kind::mistaken(&bytes) {
+    if let Some(words) = file_kind::mistaken_for_text(&bytes) {
         return Err(unreadable(file, io::Error::new(io::ErrorKind::InvalidData, words)));
     }
     String::from_utf8(bytes).map_err(|error| {

@@ -42,6 +42,8 @@ fn a_directory_is_refused_with_what_the_system_says() {
 fn bytes_that_are_not_utf8_are_refused_with_their_line() {
     let message = refused(b"name = \"a\"\nhand = \"\xff.csv\"\n");
     assert_eq!(message, "dir/s.toml:2: byte 19 is not UTF-8 text; save the file as UTF-8");
+    let message = refused(b"\x89PNG\r\n\x1a\n");
+    assert_eq!(message, "dir/s.toml: cannot be read: it is a picture; name the file itself");
     let message = refused(b"\xff\xfen\0a\0");
     assert_eq!(message, "dir/s.toml: cannot be read: it is UTF-16 text; save the file as UTF-8");
 }

@@ -317,6 +317,12 @@ fn a_file_whose_content_is_not_what_its_name_says_is_told_as_both() {
             b"glTF\x02",
             "found glTF in a file whose name says ASE; allowed: a name that ends in .gltf or .glb",
         ),
+        (
+            "a.obj",
+            b"v 0 0 0\rv 1 0 0\rv 0 1 0\rf 1 2 3\r",
+            "cannot be read: its lines end in carriage returns alone, as of old Macintoshes; save it with the line ends of \
+             Unix or Windows",
+        ),
         ("a.obj", b"\xff\xfev\0 \0", "cannot be read: it is UTF-16 text; save the file as UTF-8"),
     ] {
         let found = model::read(Path::new(name), bytes).expect_err("refused").to_string();
