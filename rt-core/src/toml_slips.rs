@@ -79,9 +79,8 @@ fn word_without_quotes(before: &str, rest: &str) -> Option<String> {
 /// `5 mm`, `500N/m`
 fn number_with_unit(before: &str, rest: &str) -> Option<String> {
     const MOST_CHARS: usize = 40;
-    let is_value = before.contains('=') && before.trim_end().ends_with(['=', '[', ',']);
-    let value = rest.split([',', ']', '}', '#']).next().unwrap_or_default().trim_end();
-    let is_one = is_value && value.chars().count() <= MOST_CHARS && has_unit(value);
+    let value = value_around(before, rest).filter(|_| before.contains('='))?;
+    let is_one = value.chars().count() <= MOST_CHARS && has_unit(&value);
     is_one.then(|| format!("found {value}, allowed: a number alone; {NO_UNITS}"))
 }
 

@@ -1,6 +1,6 @@
 //! A driver as a child process with a socket of its own.
 
-use crate::programs;
+use crate::{programs, workplace};
 use patience::prelude::*;
 use shm_abi::client::{self, AttachError, Attachment};
 use std::io::Write;
@@ -102,12 +102,8 @@ fn spawn(config: &str, socket: &Path) -> Child {
 
 fn spawn_as(config: &str, socket: &Path, command: Command) -> Child {
     let mut command = command;
-    let mut child = command
-        .args(["run", "--config", "-", "--quiet", "--socket"])
-        .arg(socket)
-        .stdin(Stdio::piped())
-        .spawn()
-        .expect("the driver starts");
+    command.args(["run", "--config", "-", "--quiet", "--socket"]).arg(socket).stdin(Stdio::piped());
+    let mut child = workplace::spawn(&mut command);
     child.stdin.take().expect("piped").write_all(config.as_bytes()).expect("it reads its configuration");
     child
 }

@@ -215,7 +215,7 @@ fn collect(directory: &Path, files: &mut BTreeMap<PathBuf, Vec<u8>>) {
 
 /// A copy of a program may still be open for writing in a child that another thread is just starting, which has not yet
 /// got to where such files are closed: the kernel then refuses to run the copy, for a moment.
-fn spawn(command: &mut Command) -> Child {
+pub(crate) fn spawn(command: &mut Command) -> Child {
     for _ in 0..100 {
         match command.spawn() {
             Err(error) if error.kind() == std::io::ErrorKind::ExecutableFileBusy => {

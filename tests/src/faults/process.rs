@@ -2,6 +2,7 @@
 
 use crate::driver::{HANG, wait_or_kill_after};
 use crate::programs;
+use crate::workplace::spawn;
 use patience::prelude::*;
 use patience::{limit, watched};
 use rustix::event::{PollFd, PollFlags, Timespec, poll};
@@ -35,14 +36,14 @@ pub struct Running {
 impl Running {
     /// Starts it. It must not say more than a pipe holds, 64 KiB, before it ends.
     pub fn start(command: &mut Command) -> Self {
-        let child = command.stdout(Stdio::piped()).stderr(Stdio::piped()).stdin(Stdio::null()).spawn();
-        Self { child: child.expect("the program starts"), heard: String::new() }
+        let child = spawn(command.stdout(Stdio::piped()).stderr(Stdio::piped()).stdin(Stdio::null()));
+        Self { child, heard: String::new() }
     }
 
     /// Starts it with a standard error of one's own, which is not listened to.
     pub fn start_saying_to(command: &mut Command, err: impl Into<Stdio>) -> Self {
-        let child = command.stdout(Stdio::null()).stderr(err).stdin(Stdio::null()).spawn();
-        Self { child: child.expect("the program starts"), heard: String::new() }
+        let child = spawn(command.stdout(Stdio::null()).stderr(err).stdin(Stdio::null()));
+        Self { child, heard: String::new() }
     }
 
     /// Its process id.

@@ -677,7 +677,7 @@ fn what_is_wrong_with_a_gltf_is_told_with_its_place() {
         (
             "\"nodes\":[{\"mesh\":0}]",
             "\"nodes\":[{\"mesh\":-1}]",
-            "line 3: found invalid value: integer `-1`, expected usize; allowed: a text of glTF 2.0 (JSON)",
+            "line 3: found invalid value: integer `-1`, expected a whole number, 0 or more; allowed: a text of glTF 2.0 (JSON)",
         ),
         (
             "\"mesh\":0",
