@@ -97,7 +97,7 @@ enum AppCommand {
 }
 
 /// Time limit for writing the lines of a run that has ended.
-const LAST_WORDS: Duration = Duration::from_secs(5);
+pub(crate) const LAST_WORDS: Duration = Duration::from_secs(5);
 
 /// Runs the program with the process's own arguments.
 pub fn main() -> ExitCode {

@@ -3,8 +3,9 @@
 //! Model: a thread looks for them, since the one that works may wait for whoever reads a pipe. Results that are not whole
 //! are taken back, which is told; the exit status is 128 and the signal's number.
 
+use crate::cli::LAST_WORDS;
 use crate::outcome::{RunFailure, Stop, no_thread};
-use io_driver::say::say;
+use io_driver::say::{self, say};
 use rt_core::replacement::{Abandoned, abandon_all};
 use rt_core::signals::StopSignals;
 use std::process::ExitCode;
@@ -39,5 +40,6 @@ pub(crate) fn end(signal: i32) -> ! {
         say(format_args!("phantom3: {} {left}", place.display()));
     }
     let _: ExitCode = Stop::Signal(signal).conclude();
+    say::flush(LAST_WORDS);
     std::process::exit(128 + signal)
 }
