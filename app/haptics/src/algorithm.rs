@@ -91,7 +91,7 @@ impl TouchInput<'_> {
                 let (nearest, is_inside) = mesh.nearest_and_side(hip_B);
                 radius_m + if is_inside { nearest.distance_m } else { -nearest.distance_m }
             }
-            Shape::Csg(csg) => radius_m - csg.signed_distance(hip_B),
+            Shape::Csg(csg) => csg.overlap_m(hip_B, radius_m),
             _ => self.of_surface(|surface| -surface.signed_distance(hip_B)).unwrap_or(0.0),
         };
         depth_m.max(0.0)

@@ -15,7 +15,8 @@
 //! its spring. Where it comes to rest all of the spring would be back at once, after a tick without any: the force grows by
 //! no more than the hand's way, the damper and the ramp.
 //!
-//! Cost: of a contact that came from outside three roots a tick; one signed distance where it begins inside.
+//! Cost: of a contact that came from outside three roots a tick; where it begins inside one signed distance, of a ball that
+//! overlaps a mesh or joined solids its nearest foot.
 
 use crate::algorithm::{Touch, TouchInput};
 

@@ -75,6 +75,23 @@ impl BallOnCsg {
     }
 }
 
+impl Csg {
+    /// How far a ball would have to go to touch nothing, at least; 0 if it is free \[m\].
+    ///
+    /// Outside a bound of the distance from below would make it longer than it is: there it is measured from a foot.
+    pub(crate) fn overlap_m(&self, centre_B: &Vector3<f64>, radius_m: f64) -> f64 {
+        let clear_m = self.signed_distance(centre_B);
+        if clear_m <= 0.0 {
+            return radius_m - clear_m;
+        }
+        let ground = CsgGround { csg: self, vicinity: &Vicinity::default() };
+        match ground.nearest_within(centre_B, radius_m) {
+            Ok(Some((_, distance_m))) => radius_m - distance_m,
+            _ => 0.0,
+        }
+    }
+}
+
 impl CsgGround<'_> {
     /// The solid around a point.
     #[inline]

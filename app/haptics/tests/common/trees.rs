@@ -13,6 +13,8 @@ use crate::common::{Noise, entity};
 
 pub(crate) type Contains = fn(&Vector3<f64>) -> bool;
 pub(crate) type Inside<'c> = dyn Fn(&Vector3<f64>) -> bool + 'c;
+/// A bound of the distance to the boundary, negative inside: of two points it differs by no more than they are apart.
+pub(crate) type Level<'c> = dyn Fn(&Vector3<f64>) -> f64 + 'c;
 
 /// A tree, and what is inside of it.
 pub(crate) struct Tree {
@@ -203,44 +205,50 @@ pub(crate) fn all() -> Vec<Tree> {
 
 /// A random tree of a few leaves, and its expression.
 pub(crate) fn random_tree(seed: u64) -> (CsgTree, Box<Inside<'static>>) {
+    let (tree, level) = random_solid(seed);
+    (tree, Box::new(move |p| level(p) <= 0.0))
+}
+
+/// A random tree of a few leaves, and its level.
+pub(crate) fn random_solid(seed: u64) -> (CsgTree, Box<Level<'static>>) {
     let mut noise = Noise(seed);
     let mut tree: Option<CsgTree> = None;
-    let mut contains: Box<Inside<'static>> = Box::new(|_| false);
+    let mut level: Box<Level<'static>> = Box::new(|_| f64::INFINITY);
     for i in 0..6 {
         let at = Vector3::from_fn(|_, _| noise.between(-0.02, 0.02));
         let axis = Vector3::from_fn(|_, _| noise.between(-1.0, 1.0));
         let pose = Isometry3::from_parts(at.into(), UnitQuaternion::new(axis));
         let size = if i == 0 { 2.0 } else { noise.between(0.5, 1.2) };
-        let (part, leaf): (CsgPart, Box<Inside<'static>>) = match (noise.uniform() * 3.0) as u32 {
+        let (part, leaf): (CsgPart, Box<Level<'static>>) = match (noise.uniform() * 3.0) as u32 {
             0 => {
                 let r = 0.014 * size;
-                (CsgPart::new(Sphere::new(r).unwrap(), pose), Box::new(move |p| p.norm() <= r))
+                (CsgPart::new(Sphere::new(r).unwrap(), pose), Box::new(move |p| p.norm() - r))
             }
             1 => {
                 let (r, l) = (0.01 * size, 0.05 * size);
-                let inside = move |p: &Vector3<f64>| p.x * p.x + p.z * p.z <= r * r && 2.0 * p.y.abs() <= l;
-                (CsgPart::new(Cylinder::new(r, l).unwrap(), pose), Box::new(inside))
+                let level = move |p: &Vector3<f64>| (p.x.hypot(p.z) - r).max(p.y.abs() - 0.5 * l);
+                (CsgPart::new(Cylinder::new(r, l).unwrap(), pose), Box::new(level))
             }
             _ => {
                 let sides = [0.03 * size, 0.02 * size, 0.024 * size];
-                let inside = move |p: &Vector3<f64>| (0..3).all(|i| 2.0 * p[i].abs() <= sides[i]);
-                (CsgPart::new(Cuboid::new(sides).unwrap(), pose), Box::new(inside))
+                let level = move |p: &Vector3<f64>| (p.abs() - 0.5 * Vector3::from(sides)).max();
+                (CsgPart::new(Cuboid::new(sides).unwrap(), pose), Box::new(level))
             }
         };
         let leaf = move |p: &Vector3<f64>| leaf(&pose.inverse_transform_point(&(*p).into()).coords);
         let Some(before) = tree else {
-            (tree, contains) = (Some(CsgTree::union([part])), Box::new(leaf));
+            (tree, level) = (Some(CsgTree::union([part])), Box::new(leaf));
             continue;
         };
         let op = [CsgOp::Union, CsgOp::Difference, CsgOp::Difference, CsgOp::Intersection]
             [if i > 3 { (noise.uniform() * 2.0) as usize } else { (noise.uniform() * 3.0) as usize }];
         let parts = [CsgPart::from(before), part];
-        contains = match op {
-            CsgOp::Union => Box::new(move |p| contains(p) || leaf(p)),
-            CsgOp::Difference => Box::new(move |p| contains(p) && !leaf(p)),
-            CsgOp::Intersection => Box::new(move |p| contains(p) && leaf(p)),
+        level = match op {
+            CsgOp::Union => Box::new(move |p| level(p).min(leaf(p))),
+            CsgOp::Difference => Box::new(move |p| level(p).max(-leaf(p))),
+            CsgOp::Intersection => Box::new(move |p| level(p).max(leaf(p))),
         };
         tree = Some(CsgTree { op, parts: parts.into() });
     }
-    (tree.unwrap(), contains)
+    (tree.unwrap(), level)
 }
