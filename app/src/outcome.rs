@@ -15,7 +15,7 @@ use std::process::ExitCode;
 use thiserror::Error;
 use view::NoWindow;
 
-/// Why something that was begun has come to its end.
+/// Reason for the end of something that was begun.
 #[derive(Debug)]
 pub enum Stop {
     /// It is over.

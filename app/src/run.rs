@@ -116,7 +116,7 @@ pub fn run(rig: &Rig, plan: &RunPlan, signals: &StopSignals) -> Result<(Report, 
     }
 }
 
-/// What pictures and the window show, if there are any.
+/// Stage of pictures and of the window, if there are any.
 fn stage(rig: &Rig, plan: &RunPlan, signals: &StopSignals) -> Result<Option<Stage>, RunFailure> {
     let has_window = plan.window.is_some() && plan.clock != Some(ClockMode::Virtual);
     if plan.pictures.is_none() && !has_window {

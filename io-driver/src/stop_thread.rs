@@ -37,7 +37,7 @@ pub(crate) struct Starter {
     pub(crate) guarantee: Option<Guarantee>,
 }
 
-/// What it is to do next.
+/// Next task of it.
 enum Order {
     /// Give up its rights, which only it can, and drop the sender when that is done.
     GiveUpRights(Keep, SyncSender<()>),
@@ -45,7 +45,7 @@ enum Order {
     Run(Box<Stops>),
 }
 
-/// Where stops are heard, and to whom they go.
+/// Source of stops, and their destination.
 struct Stops {
     socket: StopSocket,
     queue: Queue,

@@ -31,7 +31,7 @@ pub(super) struct Room<F> {
 }
 
 impl<F: Fn(u32) -> bool> Room<F> {
-    /// How many of these and of those that are touched there are beyond its slots.
+    /// Number of these and of those that are touched beyond its slots.
     fn excess(&self, found: &[u32]) -> usize {
         let most = found.len() + self.touched;
         if most <= self.slots {

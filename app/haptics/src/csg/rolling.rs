@@ -76,7 +76,7 @@ impl BallOnCsg {
 }
 
 impl Csg {
-    /// How far a ball would have to go to touch nothing, at least; 0 if it is free \[m\].
+    /// Shortest way of a ball to where it touches nothing, or less; 0 if it is free \[m\].
     ///
     /// Outside a bound of the distance from below would make it longer than it is: there it is measured from a foot.
     pub(crate) fn overlap_m(&self, centre_B: &Vector3<f64>, radius_m: f64) -> f64 {
