@@ -161,6 +161,26 @@ impl<F: Foot> Ball<F> {
         pressed
     }
 
+    /// Whether the spring is longer than to the centre, which is in front of all that it touches but for what steps on bent
+    /// ground leave: between walls that nearly face each other the next place in front of both may be decimetres away.
+    pub(super) fn is_pressed_beyond_its_place(&self, look: &Look, input: &ConeInput) -> bool {
+        let approach_m_s = |rest: &Rest<F>| (-rest.normal_B.dot(&input.hip_velocity_B)).max(0.0);
+        let damped_m = input.damping_s() * self.rests().iter().map(approach_m_s).sum::<f64>();
+        let longest_m = (1.0 + OF_STEPS) * (self.centre_B - input.hip_B).norm() + damped_m;
+        look.normal_spring_B.norm_squared() > longest_m * longest_m
+    }
+
+    /// Takes all that it touches to be at the centre.
+    pub(super) fn touch_exactly(&mut self, ground: &impl Ground<Foot = F>) {
+        let (near_m, centre_B) = (tolerance_m(ground, self.radius_m), self.centre_B);
+        for rest in self.rests_mut() {
+            let at_centre_m = rest.normal_B.dot(&centre_B);
+            if at_centre_m - rest.offset_m <= near_m {
+                rest.offset_m = at_centre_m;
+            }
+        }
+    }
+
     /// The part of a vector along which it can move and stay on all that it presses on.
     pub(super) fn free_part(&self, v: &Vector3<f64>) -> Vector3<f64> {
         let mut held = self.rests().iter().filter(|rest| rest.load_m > 0.0).map(|rest| rest.normal_B);
@@ -247,6 +267,9 @@ pub(super) fn distance((normal_B, offset_m): &Plane, p_B: &Vector3<f64>) -> f64 
 pub(super) fn tolerance_m(ground: &impl Ground, radius_m: f64) -> f64 {
     1e-9 * radius_m + 1e-12 * ground.extent_m()
 }
+
+/// Of a spring, what steps on bent ground may leave too much.
+const OF_STEPS: f64 = 1e-3;
 
 /// Feet that are as near to each other as this share of the radius are one.
 pub(super) const SAME_FOOT: f64 = 1e-9;

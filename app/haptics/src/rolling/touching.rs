@@ -85,7 +85,7 @@ impl<F: Foot> Touching<F> {
         }
         let pull = self.grip.begin_tick(&look.view, input);
         if let Some(tangential_B) = self.grip.hold(friction, &look.view, &pull, input) {
-            return Some(self.answer(&Rested { ball: self.ball, look, tangential_B }, input));
+            return Some(self.answer(ground, &Rested { ball: self.ball, look, tangential_B }, input));
         }
         let memory = &self.grip.memory;
         let against = || Against { friction, memory, pull: &pull, input, slides_with: Cell::new(None) };
@@ -110,7 +110,7 @@ impl<F: Foot> Touching<F> {
         let mut ball = Ball::in_free_space(input.hip_B, distance_m);
         ball.add(ground, &foot);
         let look = ball.look(ground, input);
-        Some(self.answer(&Rested { ball, look, tangential_B: Vector3::zeros() }, input))
+        Some(self.answer(ground, &Rested { ball, look, tangential_B: Vector3::zeros() }, input))
     }
 
     /// Whether the finger is round the corner, whatever friction says.
@@ -163,16 +163,22 @@ impl<F: Foot> Touching<F> {
     fn settle(&mut self, ground: &impl Ground<Foot = F>, rested: &Rested<F>, input: &ConeInput) -> Touch {
         let lag_m = |ball: &Ball<F>| (ball.centre_B - input.hip_B).norm();
         if lag_m(&rested.ball) <= lag_m(&self.ball) + tolerance_m(ground, self.ball.radius_m) {
-            return self.answer(rested, input);
+            return self.answer(ground, rested, input);
         }
         let mut ball = self.ball;
         let look = ball.look(ground, input);
-        self.answer(&Rested { ball, look, tangential_B: Vector3::zeros() }, input)
+        self.answer(ground, &Rested { ball, look, tangential_B: Vector3::zeros() }, input)
     }
 
-    fn answer(&mut self, rested: &Rested<F>, input: &ConeInput) -> Touch {
+    fn answer<G: Ground<Foot = F>>(&mut self, ground: &G, rested: &Rested<F>, input: &ConeInput) -> Touch {
         let Rested { ball, look, tangential_B } = rested;
         self.ball = *ball;
+        let mut look = *look;
+        if G::IS_BENT && self.ball.is_pressed_beyond_its_place(&look, input) {
+            self.ball.touch_exactly(ground);
+            look = self.ball.look(ground, input);
+        }
+        let ball = &self.ball;
         let (feature, piece) =
             ball.primary().map_or((Feature::Face, 0), |rest| (rest.foot.feature(), rest.foot.piece()));
         let k = input.stiffness_n_per_m;

@@ -183,6 +183,20 @@ fn a_ball_that_begins_at_a_thin_corner_feels_the_overlap_and_no_more() {
     }
 }
 
+/// Between two walls that nearly face each other a ball is drawn along, and its force is that of its god-object.
+#[test]
+fn a_ball_between_walls_that_nearly_face_each_other_has_the_force_of_its_god_object() {
+    let (tree, level) = random_solid(960);
+    let mut noise = Noise(960 ^ 77);
+    for radius_m in RADII_M {
+        for start in 0..63 {
+            let hip = Vector3::from_fn(|_, _| noise.between(-0.03, 0.03));
+            let begun = begin(&*level, &touchable(&tree, Friction::None), radius_m, &hip, &mut noise);
+            begun.unwrap_or_else(|found| panic!("start {start}: {found}"));
+        }
+    }
+}
+
 /// Fifteen million starts.
 #[test]
 #[ignore = "hours"]
