@@ -214,7 +214,7 @@ fn a_run_whose_recording_nobody_reads_tells_at_once_why_it_ended() {
     place.write("scene.toml", "[[finger]]\n");
     let words = place.path("words.txt");
     let mut run = place.phantom3();
-    run.args(["run", "scene.toml", "--seconds", "600", "--record", "-", "--record", "r.csv", "--attach"])
+    run.args(["run", "scene.toml", "--seconds", "600", "--record", "-", "--events", "e.jsonl", "--attach"])
         .arg(driver.socket());
     run.stdout(Stdio::piped()).stderr(std::fs::File::create(&words).expect("a file"));
     let mut run = run.spawn().expect("it starts");
@@ -226,9 +226,10 @@ fn a_run_whose_recording_nobody_reads_tells_at_once_why_it_ended() {
     let told = || std::fs::read_to_string(&words).expect("its words");
     patience::until("the reason", || told().contains("an emergency stop was pressed"));
     assert!(run.try_wait().expect("our child").is_none(), "it waits for its reader: {}", told());
-    // Which the other recording does not.
-    let rows = || std::fs::read_to_string(place.path("r.csv")).expect("a recording").lines().count();
-    patience::until("the rows", || rows() > 1000);
+    // Which the events do not.
+    let events = || std::fs::read_to_string(place.path("e.jsonl")).expect("events");
+    patience::until("the event", || events().contains("\"fault\""));
+    assert!(run.try_wait().expect("our child").is_none(), "it waits for its reader still");
     drop(run.stdout.take());
     assert_eq!(run.bounded_wait().code(), Some(3), "{}", told());
 }

@@ -232,7 +232,11 @@ fn an_app_whose_driver_faults_says_why_with_its_report_and_what_it_wrote_is_comp
         assert!(end.err.contains(message), "{end:?}");
         let rows = recording::Table::read(&table.path("out.csv")).len();
         assert!(rows > 0);
-        let told = [format!("recording    out.csv ({rows} rows)"), "1 faults".into(), "ticks        ".into()];
+        let told = [
+            format!("recording    out.csv ({rows} rows)"),
+            "1 faults".into(),
+            "faults       1 of the driver".into(),
+        ];
         assert!(told.iter().all(|words| end.out.contains(words)), "{end:?}");
         let events = std::fs::read_to_string(table.path("out.jsonl")).expect("events");
         let last: serde_json::Value =
