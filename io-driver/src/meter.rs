@@ -40,7 +40,7 @@ pub fn read(block: &HistogramBlock) -> Histogram {
     Histogram::from_counts(&counts, block.max_ns.load(Ordering::Relaxed))
 }
 
-/// What was recorded between two readings of one histogram. The largest value of the interval is known exactly if it is the
+/// Values recorded between two readings of one histogram. The largest value of the interval is known exactly if it is the
 /// largest of all; else it is the upper end of its highest bucket, or the overall one if that is smaller.
 pub fn since(before: &Histogram, after: &Histogram) -> Histogram {
     let mut counts = Box::new([0; BUCKETS]);

@@ -33,7 +33,7 @@ const STACK_BYTES: usize = 64 * 1024;
 pub(crate) struct Starter {
     send: SyncSender<Order>,
     begun: Receiver<io::Result<()>>,
-    /// What it obtained; `None`: the loop has no real time either.
+    /// Its priority as obtained; `None`: the loop has no real time either.
     pub(crate) guarantee: Option<Guarantee>,
 }
 
@@ -58,7 +58,7 @@ impl Starter {
     /// fill all CPUs, and leave the loop its own, keep no stop waiting.
     ///
     /// # Errors
-    /// What the system says to another thread, or to the signals of this one.
+    /// Refusal of another thread by the system, or of what is asked for the signals of this one.
     pub(crate) fn spawn(loop_priority: Option<u8>) -> io::Result<Self> {
         signals::block_in_this_thread()?;
         let (send, orders) = sync_channel(1);
@@ -95,7 +95,7 @@ impl Starter {
     /// Has it hear stops.
     ///
     /// # Errors
-    /// What the system says to the second thread, or to signals of the first.
+    /// Refusal of the second thread by the system, or of what is asked for the signals of the first.
     pub(crate) fn start(self, socket: StopSocket, urgent: Urgent, is_quiet: bool) -> io::Result<()> {
         let queue = Queue::start(socket.drain()?)?;
         let stops = Stops { socket, queue, urgent, is_quiet };

@@ -62,7 +62,7 @@ pub fn hint_for_cell(cell: &str) -> &'static str {
     if cell.contains(is_comma) && number.parse::<f64>().is_ok() { DECIMAL_POINT } else { "" }
 }
 
-/// What to say of a cell that is half of one in quotes.
+/// Hint for a cell that is half of one in quotes.
 pub fn hint_for_half_a_cell(cell: &str) -> &'static str {
     let number = cell.strip_prefix('"').or_else(|| cell.strip_suffix('"'));
     if number.is_some_and(|number| number.parse::<f64>().is_ok()) { DECIMAL_POINT } else { "" }

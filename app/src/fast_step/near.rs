@@ -74,8 +74,8 @@ impl Near {
         self.is_crowded
     }
 
-    /// What is near a finger of this radius (m), and in its space, that has come from there to here: no more than it has
-    /// room for.
+    /// Entities near a finger of this radius (m), and in its space, that has come from there to here: no more than it
+    /// has room for.
     pub(super) fn update(
         &mut self,
         of: (&BroadPhase, &[Entity]),
@@ -240,7 +240,7 @@ mod tests {
         assert!(!near.is_crowded());
     }
 
-    /// What is touched is there with its box or without, and takes one slot.
+    /// A touched entity is there with its box or without, and takes one slot.
     #[test]
     fn what_is_touched_crowds_nobody_out_when_it_is_near_again() {
         let entities = entities();

@@ -28,7 +28,7 @@ pub(super) const KEYS: [&str; 17] = [
     "to",
 ];
 
-/// What the number of an order, of a fault or of a scene means, in words.
+/// Meaning of the number of an order, of a fault or of a scene, in words.
 pub(super) fn said(event: &Event, book: &Book) -> Said {
     match event.kind {
         Kind::Order { number } => (book.order(number), None),

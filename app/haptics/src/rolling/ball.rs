@@ -161,7 +161,7 @@ impl<F: Foot> Ball<F> {
         pressed
     }
 
-    /// Whether the spring is longer than to the centre, which is in front of all that it touches but for what steps on bent
+    /// True if the spring is longer than to the centre, which is in front of all that it touches but for what steps on bent
     /// ground leave: between walls that nearly face each other the next place in front of both may be decimetres away.
     pub(super) fn is_pressed_beyond_its_place(&self, look: &Look, input: &ConeInput) -> bool {
         let approach_m_s = |rest: &Rest<F>| (-rest.normal_B.dot(&input.hip_velocity_B)).max(0.0);

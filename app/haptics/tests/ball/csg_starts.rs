@@ -72,7 +72,7 @@ fn distance_m(level: &Level<'_>, from: &Vector3<f64>) -> [f64; 2] {
     [cubes.pop().map_or(across_m, |cube| cube.distance_m), across_m]
 }
 
-/// How far a finger would have to go to come clear of the nearest boundary, from above.
+/// Way of a finger until it is clear of the nearest boundary, from above.
 fn overlap_m(level: &Level<'_>, hip: &Vector3<f64>, radius_m: f64) -> f64 {
     let [least_m, most_m] = distance_m(level, hip);
     (radius_m + if level(hip) <= 0.0 { most_m } else { -least_m }).max(0.0)
@@ -207,6 +207,6 @@ fn no_finger_that_begins_anywhere_about_twenty_thousand_trees_is_flung() {
 const RADII_M: [f64; 4] = [0.0, 1e-3, 5e-3, 0.02];
 /// Half of the width that slopes are found over.
 const PROBE_M: f64 = 1e-7;
-/// What the search for the nearest boundary may leave open.
+/// Width that the search for the nearest boundary may leave open.
 const RESOLUTION_M: f64 = 2e-5;
 const MOST_LOOKS: u32 = 30_000;

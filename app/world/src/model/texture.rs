@@ -184,7 +184,7 @@ fn read_jpeg(bytes: &[u8]) -> Result<Texture, String> {
     Texture::new(size, texels)
 }
 
-/// Whether the marker of the end comes behind the last scan, in whose data no marker can be.
+/// True if the marker of the end comes behind the last scan, in whose data no marker can be.
 fn has_jpeg_end(bytes: &[u8]) -> bool {
     let last = |marker: [u8; 2]| bytes.windows(2).rposition(|pair| pair == marker);
     last([0xff, 0xd9]) > last([0xff, 0xda])
