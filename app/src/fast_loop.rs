@@ -262,6 +262,8 @@ impl FastLoop {
         self.step.reset();
         self.pending = None;
         self.offset_ticks = None;
+        // Another driver counts from elsewhere.
+        self.row_tick = u64::MAX;
     }
 
     fn answer(&mut self, commander: &CommanderMemory, driver: &DriverView) {

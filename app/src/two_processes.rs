@@ -99,7 +99,7 @@ pub fn describe(source: &Source, attachment: &Attachment) -> String {
 /// Runs to the end.
 ///
 /// # Errors
-/// If the fast thread could not do its work.
+/// If there can be no fast thread, or it panicked.
 pub fn run(
     source: &mut Source,
     attachment: Attachment,

@@ -13,6 +13,7 @@ use std::path::{Path, PathBuf};
 
 use rt_core::likeness::nearest;
 use rt_core::toml_slips;
+use rt_core::type_words::type_in_words;
 use serde::de::DeserializeOwned;
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
@@ -194,13 +195,7 @@ fn in_words(message: &str) -> String {
         return format!("{message} (did you mean `{meant}`?)");
     }
     let Some((found, expected)) = message.rsplit_once(", expected ") else { return message.to_owned() };
-    let words = match expected {
-        "f32" | "f64" => "a number",
-        "i8" | "i16" | "i32" | "i64" | "isize" => "a whole number",
-        "u8" | "u16" | "u32" | "u64" | "usize" => "a whole number, 0 or more",
-        "a sequence" => "a list, as in [1, 2]",
-        _ => return message.to_owned(),
-    };
+    let Some(words) = type_in_words(expected) else { return message.to_owned() };
     let text = found.strip_prefix("invalid type: string \"").and_then(|text| text.strip_suffix('"'));
     let hint = text.filter(|_| words.contains("number")).map_or_else(String::new, toml_slips::hint_for_text);
     format!("{found}, expected {words}{hint}")

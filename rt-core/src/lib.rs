@@ -17,7 +17,7 @@
 //! show that a loop does not allocate.
 //! [`input_file`] reads files that others name, [`output_file`] opens those to be written, [`replacement`] has them
 //! take their places when they are whole, [`separators`] and [`toml_slips`] know what is usually wrong
-//! in tables and in TOML, [`likeness`] which word was meant, [`limits`] what to do where the system has no more to give,
+//! in tables and in TOML, [`type_words`] how types are called, [`likeness`] which word was meant, [`limits`] what to do where the system has no more to give,
 //! and [`plain_text`] keeps foreign text from acting on a terminal.
 //! [`doctor`] says whether the machine is ready for any of this, [`read_back`] what root has set for it, and
 //! [`installed`] names what a laboratory's installation consists of.
@@ -58,6 +58,7 @@ pub mod signals;
 pub mod spin_margin;
 pub mod time_namespace;
 pub mod toml_slips;
+pub mod type_words;
 pub mod usage;
 
 #[allow(unsafe_code, reason = "the one place for system calls that no safe crate wraps")]

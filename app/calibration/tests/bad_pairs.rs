@@ -265,10 +265,14 @@ fn one_wild_pair_spoils_a_fit_to_all_and_not_one_without_it() {
 
 #[test]
 fn decimal_commas_are_told_as_such() {
-    for row in ["0,1;0,2;0,3;-0,4;0,5;0,6", "0,1 0,2 0,3 -0,4 0,5 0,6"] {
+    let among_commas = "0,1,0,2,0,3,-0,4,0,5,0,6";
+    for row in ["0,1;0,2;0,3;-0,4;0,5;0,6", "0,1 0,2 0,3 -0,4 0,5 0,6", among_commas, "0,0,1,0,2,0,3,0"] {
         let said = parse_pairs(row).expect_err("commas").to_string();
         assert!(said.ends_with("; a decimal number has a point, as in 0.1"), "{said}");
     }
-    let said = parse_pairs("1;2;3;4;5;6;7").expect_err("seven").to_string();
-    assert!(said.ends_with("in metres"), "{said}");
+    for row in ["1;2;3;4;5;6;7", "1,2,3,4,5,6,7", "0.1,2,3,4,5,6,7,8"] {
+        let said = parse_pairs(row).expect_err("no six").to_string();
+        assert!(said.ends_with("in metres"), "{said}");
+    }
+    assert_eq!(parse_pairs("\"1\",\"2\", 3,4,5,6").expect("quotes are none of it").len(), 1);
 }

@@ -488,6 +488,18 @@ fn check_suspects_hands_and_layouts_of_another_unit() {
     place.write("m.toml", "[[device]]\nposition_m = [-0.15, 0, 0]\n");
     let divide =
         "farther than an arm reaches; places are in metres: if millimetres were meant, divide them by 1000";
+    let start = with_cube("[0.05, 0.05, 0.05]", "0.1", "[0.0, 0.0, 0.0]").replacen(
+        "[0.0, 0.2, 0.0]",
+        "[0.0, 50.0, 0.0]",
+        1,
+    );
+    place.write("start.toml", &start);
+    let said = check(&place, &["start.toml"]);
+    assert!(
+        said.out.contains("finger f0 begins at (0, 50, 0) m, farther than an arm reaches"),
+        "{}",
+        said.out
+    );
     for (arguments, parts) in [
         (["--hand", "mm.csv"], &["finger f0 goes along 60 m in", "mm.csv", divide][..]),
         (["--hand", "far.csv"], &["finger f0 goes as far as 80 m from the origin in", "far.csv", divide]),

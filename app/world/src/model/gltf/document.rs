@@ -2,6 +2,7 @@
 
 use super::{missing, wrong};
 use crate::model::ModelError;
+use rt_core::type_words::type_in_words;
 use serde::Deserialize;
 use serde_json::Value;
 
@@ -182,14 +183,12 @@ impl Document {
             let said = error.to_string();
             let said = said.split(" at line ").next().unwrap_or_default();
             let (what, expected) = said.rsplit_once(", expected ").unwrap_or((said, ""));
-            let expected = match expected {
+            let what = what.strip_prefix("invalid type: ").unwrap_or(what);
+            let what = if what == "map" { "an object" } else { what };
+            let expected = match type_in_words(expected).unwrap_or(expected) {
                 "" => String::new(),
-                "usize" | "u64" | "u32" => ", expected a whole number, 0 or more".into(),
-                "f64" | "f32" => ", expected a number".into(),
-                "a sequence" => ", expected a list".into(),
-                other => format!(", expected {other}"),
+                words => format!(", expected {words}"),
             };
-            let what = what.replacen("invalid type: ", "", 1).replacen("map", "an object", 1);
             let found: String = format!("{what}{expected}").escape_default().take(LONGEST_WORDS).collect();
             let found = found.replace("\\\"", "\"");
             let other = || ModelError::Line {

@@ -21,6 +21,8 @@ pub(super) struct Materials {
     /// Of each material, how its texture lies on faces.
     lies: Vec<Option<Lie>>,
     pub(super) unread: Vec<String>,
+    /// Of all pictures together.
+    most_texels: usize,
     texels_left: usize,
     /// The pictures together are too much: why, and how many more there are.
     excess: Option<(String, usize)>,
@@ -125,11 +127,16 @@ fn element<T: DeserializeOwned + Default>(list: &Value, index: usize) -> T {
 
 impl Materials {
     pub(super) fn read(document: &Document, buffers: &mut Buffers<'_>) -> Self {
+        Self::read_within(document, buffers, MOST_TEXELS)
+    }
+
+    fn read_within(document: &Document, buffers: &mut Buffers<'_>, most_texels: usize) -> Self {
         let mut read = Self {
             finishes: Vec::new(),
             lies: Vec::new(),
             unread: Vec::new(),
-            texels_left: MOST_TEXELS,
+            most_texels,
+            texels_left: most_texels,
             excess: None,
         };
         let mut images = Vec::new();
@@ -229,7 +236,8 @@ impl Materials {
             }
             None => {
                 let why = format!(
-                    "{named}: found more than {MOST_TEXELS} places in all pictures; allowed: so many"
+                    "{named}: found more than {} places in all pictures; allowed: so many",
+                    self.most_texels
                 );
                 self.excess = Some((why, 0));
                 None
@@ -273,3 +281,46 @@ fn mode(material: &Material) -> Mode {
 
 /// The format's.
 const USUAL_CUTOFF: f64 = 0.5;
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Two places, one above the other.
+    fn picture() -> Vec<u8> {
+        let mut made = Vec::new();
+        let mut encoder = png::Encoder::new(&mut made, 1, 2);
+        encoder.set_color(png::ColorType::Grayscale);
+        encoder.set_depth(png::BitDepth::Eight);
+        encoder.write_header().unwrap().write_image_data(&[7, 9]).unwrap();
+        made
+    }
+
+    #[test]
+    fn pictures_that_are_too_much_together_are_told_once_by_the_first() {
+        let list = |of: &dyn Fn(usize) -> String| (0..5).map(of).collect::<Vec<_>>().join(",");
+        let picture = picture();
+        let length = picture.len();
+        let text = format!(
+            r#"{{"asset": {{"version": "2.0"}}, "materials": [{}], "textures": [{}], "images": [{}], "bufferViews": [{}],
+                "buffers": [{{"byteLength": {}}}]}}"#,
+            list(&|k| format!(r#"{{"pbrMetallicRoughness": {{"baseColorTexture": {{"index": {k}}}}}}}"#)),
+            list(&|k| format!(r#"{{"source": {k}}}"#)),
+            list(&|k| format!(r#"{{"bufferView": {k}}}"#)),
+            list(&|k| format!(r#"{{"buffer": 0, "byteOffset": {}, "byteLength": {length}}}"#, k * length)),
+            5 * length
+        );
+        let document = Document::parse(text.as_bytes()).unwrap();
+        let binary = picture.repeat(5);
+        let mut buffers = Buffers::load(&document, Some(&binary), None).unwrap();
+        let read = Materials::read_within(&document, &mut buffers, 5);
+        let has = |finish: &Finish| finish.texture.is_some();
+        assert_eq!(
+            read.finishes.iter().map(has).collect::<Vec<_>>(),
+            [true, true, false, false, false, false]
+        );
+        let [said] = &read.unread[..] else { panic!("{:?}", read.unread) };
+        assert!(said.starts_with("images[2]: found more than 5 places in all pictures"), "{said}");
+        assert!(said.ends_with("; 2 more pictures are left out"), "{said}");
+    }
+}
