@@ -1,7 +1,7 @@
 //! Reading of scenes, models and textures, which may take long: a line for whoever waits, and an ear for signals.
 
 use crate::interrupted;
-use crate::progress::StatusLine;
+use crate::progress::{SOON, StatusLine};
 use rt_core::plain_text::Plain;
 use rt_core::signals::StopSignals;
 use std::path::Path;
@@ -9,8 +9,6 @@ use std::sync::mpsc::{RecvTimeoutError, sync_channel};
 use std::thread::ScopedJoinHandle;
 use std::time::{Duration, Instant};
 
-/// Less is no waiting, on a terminal; a file that takes what is said hears later.
-const SOON: Duration = Duration::from_secs(1);
 /// Between two looks for a signal.
 const TURN: Duration = Duration::from_millis(20);
 

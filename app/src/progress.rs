@@ -7,6 +7,8 @@ use std::io::IsTerminal;
 use std::time::{Duration, Instant};
 
 const ON_TERMINAL: Duration = Duration::from_millis(200);
+/// Less is no waiting, on a terminal; a file that takes what is said hears later.
+pub(crate) const SOON: Duration = Duration::from_secs(1);
 const ELSEWHERE: Duration = Duration::from_secs(10);
 
 /// A line that is told anew again and again.

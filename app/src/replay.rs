@@ -21,7 +21,7 @@ use crate::outputs::{self, Output};
 use crate::progress::StatusLine;
 use crate::record::destination::{is_standard_output, shown};
 use crate::record::read::{self, ReadError, RecordedRun};
-use crate::record::{self, About, Recorder, View};
+use crate::record::{self, About, Backpressure, Recorder, View};
 use crate::rig::Rig;
 use crate::row_queue::{RowReceiver, row_queue};
 use crate::run::EVENT_QUEUE;
@@ -96,7 +96,7 @@ pub fn execute(
     }
     refuse_late_beginning(args, &feed, &stage)?;
     let orders = read::orders(&args.recording);
-    let mut play = Play::new(&stage, Arc::new(Mutex::new(feed)), orders, &args.record)?;
+    let mut play = Play::new(&stage, Arc::new(Mutex::new(feed)), orders, &args.record, signals)?;
     let ended = play.run(signals);
     play.conclude(args, &stage, ended)
 }
@@ -161,6 +161,7 @@ impl Play {
         feed: SharedFeed,
         orders: Vec<(u64, String)>,
         records: &[PathBuf],
+        signals: &StopSignals,
     ) -> Result<Self, RunFailure> {
         let rig = &stage.rig;
         let (recorded_names, period_ns) = {
@@ -199,7 +200,8 @@ impl Play {
         let create =
             |_, file| record::create(file, names.clone(), period_ns, &stage.about, &view, (&book, 0));
         let begun = record::begin_all(&records.iter().collect::<Vec<_>>(), create)?;
-        let start = |path: &Path, file| Recorder::start(path, file, bodies, period_ns, WhenFull::Wait.into());
+        let backpressure = Backpressure::new(WhenFull::Wait, signals);
+        let start = |path: &Path, file| Recorder::start(path, file, bodies, period_ns, backpressure.clone());
         let mut recorders = Recorder::start_all(records.iter().zip(begun), start)?;
         slow::subscribe(&mut recorders, &mut hub);
         Ok(Self {

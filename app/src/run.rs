@@ -16,7 +16,7 @@ use crate::outputs::{self, Output};
 use crate::premises::Premises;
 use crate::progress::Progress;
 use crate::record::destination::RunFormat;
-use crate::record::{About, Files, Recorded, View};
+use crate::record::{About, Backpressure, Files, Recorded, View};
 use crate::report::{Report, recording_line};
 use crate::rig::{HandMode, Rig, RigError};
 use crate::row_queue::row_queue;
@@ -144,7 +144,7 @@ impl Parts {
         period_ns: u64,
         devices: &[Extras],
         about: &About,
-        (stage, reins): (Option<Stage>, Option<Box<dyn Reins>>),
+        (stage, reins, signals): (Option<Stage>, Option<Box<dyn Reins>>, &StopSignals),
     ) -> Result<Self, RunFailure> {
         let seconds = plan.seconds.unwrap_or_else(|| rig.default_seconds());
         let total_ticks = (seconds * 1e9 / period_ns as f64).round() as u64;
@@ -203,7 +203,7 @@ impl Parts {
             events: plan.events.clone(),
             extras: devices.to_vec(),
             period_ns,
-            backpressure: when_full.into(),
+            backpressure: Backpressure::new(when_full, signals),
             book,
             about: about.clone(),
             taken: plan.inputs.iter().chain(&others).chain(pictures).cloned().collect(),
@@ -259,8 +259,15 @@ fn run_virtual(
     let devices = open_devices_with(&config, rig.hand_files())?;
     let mut driver = VirtualDriver::with_devices(&config, devices)?;
     let about = About::of_run(rig, ClockMode::Virtual, rig.period_ns, plan.seed);
-    let Parts { mut fast, mut slow, mut progress, .. } =
-        Parts::new(rig, plan, ClockMode::Virtual, rig.period_ns, &driver.extras(), &about, (stage, None))?;
+    let Parts { mut fast, mut slow, mut progress, .. } = Parts::new(
+        rig,
+        plan,
+        ClockMode::Virtual,
+        rig.period_ns,
+        &driver.extras(),
+        &about,
+        (stage, None, signals),
+    )?;
     let stop = driver.run(&mut fast, &mut slow, &mut progress, signals);
     progress.end();
     let stop = stop.of_run(&fast.tally);
@@ -312,8 +319,15 @@ fn run_two_processes(
     about.tell("lease", attachment.commander.as_ref().map_or(0, CommanderMemory::lease).to_string());
     let reins = live.map(|live| live.into_reins(rig)).transpose()?;
     let reins = reins.map(|reins| Box::new(reins) as Box<dyn Reins>);
-    let Parts { fast, mut slow, mut progress, slow_lists } =
-        Parts::new(&step_rig, plan, info.clock_mode, info.period_ns, &extras, &about, (stage, reins))?;
+    let Parts { fast, mut slow, mut progress, slow_lists } = Parts::new(
+        &step_rig,
+        plan,
+        info.clock_mode,
+        info.period_ns,
+        &extras,
+        &about,
+        (stage, reins, signals),
+    )?;
     slow.watch_driver(source.socket());
     let watched = (&mut slow, &mut progress, signals);
     let known = (&premises, &mut totals);

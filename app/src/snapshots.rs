@@ -12,9 +12,7 @@ mod args;
 pub use args::{Film, PictureArgs, Shot, Wanted};
 
 use crate::displaced::Placed;
-use crate::fast_loop::WhenFull;
 use crate::moments::Moments;
-use crate::record::Backpressure;
 use crate::record::backpressure::{Progress, STUCK, Wait};
 use crate::row::{BodyRow, Row};
 use crate::shown::Shown;
@@ -126,9 +124,7 @@ impl Snapshots {
         let draw = move |work: Receiver<Work>, steps: &Progress, written: &AtomicU64| {
             draw_all(stage, &look, &work, steps, written)
         };
-        let backpressure =
-            Backpressure { when_full: if waits { WhenFull::Wait } else { WhenFull::Drop }, patience: STUCK };
-        Self::drawn_by(draw, wanted, moments, period_ns, backpressure)
+        Self::drawn_by(draw, wanted, moments, period_ns, (waits, STUCK))
     }
 
     /// The same with somebody else who draws.
@@ -137,7 +133,7 @@ impl Snapshots {
         wanted: &Wanted,
         moments: Moments,
         period_ns: u64,
-        Backpressure { when_full, patience }: Backpressure,
+        (waits, patience): (bool, Duration),
     ) -> Result<Self, String> {
         let (out, to_draw) = sync_channel(WAITING);
         let progress = Arc::new(Progress::default());
@@ -154,7 +150,7 @@ impl Snapshots {
             film: wanted.film.clone(),
             due: 0,
             left_out: 0,
-            waits: when_full == WhenFull::Wait,
+            waits,
             patience,
             period_s: period_ns as f64 / 1e9,
             moments,
@@ -400,9 +396,9 @@ mod tests {
         Wanted { shots, film, size: [16, 16], camera: None, eyes: Eyes::default() }
     }
 
-    fn start(wanted: &Wanted, when_full: WhenFull, patience_ms: u64) -> (Snapshots, Sender<()>) {
+    fn start(wanted: &Wanted, waits: bool, patience_ms: u64) -> (Snapshots, Sender<()>) {
         let (turn, turns) = channel();
-        let how = Backpressure { when_full, patience: Duration::from_millis(patience_ms) };
+        let how = (waits, Duration::from_millis(patience_ms));
         let moments = Moments::new(1, Vec::new(), Vec::new(), 1_000_000);
         (Snapshots::drawn_by(idle(turns), wanted, moments, 1_000_000, how).expect("a thread"), turn)
     }
@@ -413,7 +409,7 @@ mod tests {
 
     #[test]
     fn behind_a_wait_in_vain_no_picture_is_tried_also_if_the_reader_comes_back() {
-        let (mut snapshots, turn) = start(&wanted(0, true), WhenFull::Wait, 300);
+        let (mut snapshots, turn) = start(&wanted(0, true), true, 300);
         let room = WAITING as u64;
         look(&mut snapshots, 0..room + 3);
         for _ in 0..room {
@@ -431,7 +427,7 @@ mod tests {
 
     #[test]
     fn in_real_time_nobody_waits_for_drawing_and_single_pictures_come_when_there_is_room() {
-        let (mut snapshots, turn) = start(&wanted(50, true), WhenFull::Drop, 60_000);
+        let (mut snapshots, turn) = start(&wanted(50, true), false, 60_000);
         let begun = std::time::Instant::now();
         look(&mut snapshots, 0..60);
         // A wait for the thread, which does nothing, would be a minute long.
@@ -447,7 +443,7 @@ mod tests {
 
     #[test]
     fn a_single_picture_that_is_never_written_is_a_fault_at_the_end() {
-        let (mut snapshots, turn) = start(&wanted(20, false), WhenFull::Drop, 300);
+        let (mut snapshots, turn) = start(&wanted(20, false), false, 300);
         look(&mut snapshots, 0..30);
         let drawn = snapshots.finish();
         drop(turn);
@@ -457,7 +453,6 @@ mod tests {
 
     #[test]
     fn a_drawing_thread_that_panics_is_a_fault_with_the_pictures_that_were_written() {
-        let how = Backpressure { when_full: WhenFull::Wait, patience: STUCK };
         let draw = |work: Receiver<Work>, steps: &Progress, written: &AtomicU64| {
             for _ in work.iter().take(3) {
                 written.fetch_add(1, Ordering::Relaxed);
@@ -466,7 +461,7 @@ mod tests {
             panic!("the graphics library is gone");
         };
         let moments = Moments::new(1, Vec::new(), Vec::new(), 1_000_000);
-        let snapshots = Snapshots::drawn_by(draw, &wanted(0, true), moments, 1_000_000, how);
+        let snapshots = Snapshots::drawn_by(draw, &wanted(0, true), moments, 1_000_000, (true, STUCK));
         let mut snapshots = snapshots.expect("a thread");
         look(&mut snapshots, 0..50);
         let drawn = snapshots.finish();

@@ -149,3 +149,22 @@ fn expect_compatible(version: &AtomicU64) -> Result<(), SegmentError> {
         found => Err(SegmentError::WrongHeader { what: "ABI version", found, expected: ABI_VERSION }),
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_limit_of_this_process_is_told_with_what_raises_it() {
+        for (errno, word) in [
+            (Errno::FBIG, "`ulimit -f`"),
+            (Errno::MFILE, "`ulimit -n`"),
+            (Errno::NFILE, "fs.file-max"),
+            (Errno::NOMEM, "`ulimit -v`"),
+            (Errno::AGAIN, "`ulimit -l`"),
+        ] {
+            assert!(remedy(&errno.into()).contains(word), "{errno}");
+        }
+        assert_eq!(remedy(&Errno::IO.into()), "");
+    }
+}

@@ -248,6 +248,12 @@ mod tests {
         assert_eq!(whole_path(Path::new("driver.sock")), here.join("driver.sock"));
     }
 
+    #[test]
+    fn another_place_is_no_remedy_where_files_are_too_many() {
+        assert!(remedy(&Errno::MFILE.into()).contains("`ulimit -n`"));
+        assert!(remedy(&Errno::ACCESS.into()).contains("--socket"));
+    }
+
     /// A pipe would be waited for, and what a link leads to made, both before any signal is heeded.
     #[test]
     #[cfg_attr(miri, ignore = "sockets and directories are the system's")]

@@ -1,29 +1,42 @@
 //! Backpressure of a recording: whoever has a row for it waits, or leaves the row out.
 //!
 //! Model: in real time a row that finds no room is left out, and later ones follow. On a clock that can wait it is waited
-//! for as long as the recorder gets on, also after a request to stop, so that a slow reader gets every row. The first
-//! wait in vain is the last: what the recording has is whole up to there, and nothing follows.
+//! for as long as the recorder gets on, also after a request to stop, so that a slow reader gets every row; one that reads
+//! nothing has less time from then on. The first wait in vain is the last: what the recording has is whole up to there, and
+//! nothing follows.
 
 use crate::fast_loop::WhenFull;
+use rt_core::signals::StopSignals;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::thread::Thread;
 use std::time::{Duration, Instant};
 
 /// A recorder that has not written anything for so long will not any more.
 pub(crate) const STUCK: Duration = Duration::from_secs(30);
+/// Nor will one that has not for so long after somebody wanted the end.
+const STUCK_AT_THE_END: Duration = Duration::from_secs(3);
 
 /// How a recorder treats whoever has more than there is room for.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone)]
 pub struct Backpressure {
     /// Whether they wait.
     pub when_full: WhenFull,
-    /// For how long without any progress.
+    /// For how long without any progress, at most.
     pub patience: Duration,
+    /// Who may want the end.
+    pub signals: StopSignals,
 }
 
-impl From<WhenFull> for Backpressure {
-    fn from(when_full: WhenFull) -> Self {
-        Self { when_full, patience: STUCK }
+impl Backpressure {
+    /// With the usual patience.
+    pub fn new(when_full: WhenFull, signals: &StopSignals) -> Self {
+        Self { when_full, patience: STUCK, signals: signals.clone() }
+    }
+
+    /// How long they wait without any progress, as things are.
+    pub(super) fn patience(&self) -> Duration {
+        let most = if self.signals.requested().is_some() { STUCK_AT_THE_END } else { self.patience };
+        self.patience.min(most)
     }
 }
 
@@ -76,13 +89,18 @@ impl Wait {
         if how.when_full == WhenFull::Drop {
             return false;
         }
-        if progress.is_given_up() || self.is_in_vain(progress, how.patience) {
+        if progress.is_given_up() || self.is_in_vain(progress, how.patience()) {
             progress.give_up();
             return false;
         }
         thread.unpark();
         std::thread::sleep(Duration::from_micros(200));
         true
+    }
+
+    /// The time since anything was taken, as far as this wait knows.
+    pub(super) fn in_vain_for(&self) -> Duration {
+        self.since.elapsed()
     }
 
     /// Whether nothing was taken for long, in this wait or one before.
@@ -122,7 +140,7 @@ mod tests {
         let reader =
             OpenOptions::new().read(true).custom_flags(without_waiting).open(pipe).expect("a reader");
         let file = Recording::create(pipe, Names::default(), PERIOD_NS).expect("a table");
-        let how = Backpressure { when_full: WhenFull::Wait, patience };
+        let how = Backpressure { patience, ..Backpressure::new(WhenFull::Wait, &StopSignals::default()) };
         let recorder = Recorder::start(pipe, RecordFile::Csv(Box::new(file)), 0, PERIOD_NS, how);
         (recorder.expect("a thread"), reader)
     }

@@ -115,7 +115,7 @@ impl Files {
 
     fn start(&self, path: &Path, file: RecordFile, rig: &Rig) -> Result<Recorder, RecordingError> {
         let bodies = rig.names(&self.extras).bodies.len();
-        Recorder::start(path, file, bodies, self.period_ns, self.backpressure)
+        Recorder::start(path, file, bodies, self.period_ns, self.backpressure.clone())
     }
 }
 

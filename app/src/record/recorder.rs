@@ -12,6 +12,7 @@ use super::backpressure::{Backpressure, Progress, Wait};
 use super::destination::shown;
 use super::record_file::RecordFile;
 use crate::fast_loop::WhenFull;
+use crate::progress::{SOON, StatusLine};
 use crate::recording::RecordingError;
 use crate::row::{BodyRow, Row};
 use crate::row_queue::{ROW_QUEUE, RowReceiver, RowSender, row_queue_of};
@@ -22,7 +23,7 @@ use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::thread::{JoinHandle, Thread};
-use std::time::Duration;
+use std::time::{Duration, Instant};
 use world::events::{Event, EventReceiver, EventSender, Subscriber, event_queue};
 
 /// Bodies that may wait, of all rows together.
@@ -155,8 +156,12 @@ impl Recorder {
             .spawn(move || writer.run(receiver))
             .map_err(|source| RecordingError::NoThread { file: shown(path), source })?;
         let (known, changed) = (vec![None; bodies], Vec::with_capacity(bodies));
-        let events =
-            Some(EventFeed { events, backpressure, shared: shared.clone(), thread: thread.thread().clone() });
+        let events = Some(EventFeed {
+            events,
+            backpressure: backpressure.clone(),
+            shared: shared.clone(),
+            thread: thread.thread().clone(),
+        });
         let path = path.into();
         Ok(Self {
             path,
@@ -257,7 +262,7 @@ impl Recorder {
                 "cannot write the recording {}: nothing was written for {} s; the run goes on without it; what comes \
                  behind t = {:?} s is not in it",
                 shown(&self.path).display(),
-                self.backpressure.patience.as_secs(),
+                self.backpressure.patience().as_secs(),
                 run_time_s(self.last_tick.cast_signed(), self.period_ns)
             );
             say(format_args!("phantom3: {why}"));
@@ -317,12 +322,25 @@ impl Recorder {
         self.close();
         self.is_given_up();
         let mut wait = Wait::begin(&self.shared.progress);
+        let (begun, mut line) = (Instant::now(), StatusLine::told_just_now());
         while !self.thread.is_finished() {
-            if wait.is_in_vain(&self.shared.progress, self.backpressure.patience) {
+            let patience = self.backpressure.patience();
+            if wait.is_in_vain(&self.shared.progress, patience) {
+                line.end();
                 return self.leave_behind();
+            }
+            if begun.elapsed() > SOON {
+                line.show(|| {
+                    let (path, for_s) = (shown(&self.path), wait.in_vain_for().as_secs());
+                    let (path, most_s) = (path.display(), patience.as_secs());
+                    format!(
+                        "phantom3: finishing the recording {path} (nothing written for {for_s} s of {most_s})"
+                    )
+                });
             }
             std::thread::sleep(Duration::from_millis(1));
         }
+        line.end();
         let Self { path, unit, lost, thread, given_up, shared, .. } = self;
         let (rows, failure) = match thread.join() {
             Ok(Ok(rows)) => (rows, None),
@@ -342,7 +360,7 @@ impl Recorder {
             let why = format!(
                 "cannot finish the recording {}: nothing was written for {} s; what reached it until now is readable",
                 shown(&self.path).display(),
-                self.backpressure.patience.as_secs()
+                self.backpressure.patience().as_secs()
             );
             say(format_args!("phantom3: {why}"));
             why

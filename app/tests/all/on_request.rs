@@ -5,12 +5,13 @@ use phantom3::book::Book;
 use phantom3::fast_loop::{FastLoop, Turn, WhenFull};
 use phantom3::on_request::OnRequest;
 use phantom3::record::read::RecordedRun;
-use phantom3::record::{About, Files, View};
+use phantom3::record::{About, Backpressure, Files, View};
 use phantom3::recording::Recording;
 use phantom3::rig::{HandMode, Rig};
 use phantom3::row_queue::row_queue;
 use phantom3::slow::SlowSide;
 use phantom3::virtual_clock::VirtualDriver;
+use rt_core::signals::StopSignals;
 use shm_abi::segment::ClockMode;
 use std::path::{Path, PathBuf};
 use tempfile::TempDir;
@@ -48,7 +49,7 @@ impl Run {
             events: Vec::new(),
             extras: driver.extras(),
             period_ns: rig.period_ns,
-            backpressure: WhenFull::Wait.into(),
+            backpressure: Backpressure::new(WhenFull::Wait, &StopSignals::default()),
             taken: Vec::new(),
             book: Book::default(),
             about: About::of_run(&rig, ClockMode::Virtual, rig.period_ns, 0),

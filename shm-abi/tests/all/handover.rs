@@ -57,6 +57,14 @@ fn stop_and_clear_fault_reach_the_loop_with_the_name_of_the_asker() {
 }
 
 #[test]
+fn what_was_asked_for_earlier_is_told_as_of_then() {
+    let directory = directory();
+    let host = Host::start(directory.path());
+    client::clear_fault_as_of(7, &host.socket, "test").unwrap();
+    assert!(matches!(host.event(), ServerEvent::ClearFaultRequested { asked_ns: 7, .. }));
+}
+
+#[test]
 fn a_second_commander_is_refused_with_pid_and_name_of_the_first() {
     let directory = directory();
     let host = Host::start(directory.path());

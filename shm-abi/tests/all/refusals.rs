@@ -2,7 +2,7 @@
 
 use crate::common::fake::{fake_server, hear, send};
 use crate::common::host::Host;
-use crate::common::{directory, info};
+use crate::common::{directory, info, own_pid};
 use patience::prelude::*;
 use patience::{accepted, limit, watched};
 use shm_abi::client::{self, AttachError};
@@ -49,6 +49,40 @@ fn a_driver_refuses_every_other_make_of_client_by_name() {
         refusal_of(&Request { magic: 1, ..good }),
         "the driver refused: it did not understand the request (WrongMagic)"
     );
+}
+
+#[test]
+fn a_driver_that_tells_another_number_of_itself_is_told_by_the_number_it_has_here() {
+    let directory = directory();
+    let socket = directory.path().join("driver.sock");
+    let answers = [Verdict::Granted, Verdict::LeaseHeld].map(|verdict| {
+        let holder_pid = if verdict == Verdict::LeaseHeld { 8 } else { 0 };
+        Answer { driver_pid: 7, holder_pid, ..Answer::new(verdict) }
+    });
+    let next = AtomicU64::new(0);
+    let server = fake_server(&socket, answers.len(), move |mut stream| {
+        hear(&mut stream);
+        send(&stream, bytemuck::bytes_of(&answers[next.fetch_add(1, Ordering::Relaxed) as usize]), &[]);
+    });
+    assert_eq!(client::stop(&socket, "test").unwrap(), own_pid());
+    // Whose number that is here, nobody knows.
+    let refusal = client::command(&socket, "test").unwrap_err();
+    assert!(matches!(refusal, AttachError::LeaseHeld { pid: 0, .. }), "{refusal:?}");
+    server.bounded_join().unwrap();
+}
+
+#[test]
+fn only_who_has_sent_a_request_may_have_been_heard() {
+    let socket = || Path::new("driver.sock").to_path_buf();
+    for heard in
+        [AttachError::NoAnswer { socket: socket(), seconds: 1 }, AttachError::HungUp { socket: socket() }]
+    {
+        assert!(heard.may_be_heard(), "{heard:?}");
+    }
+    for unheard in [AttachError::NoDriver { socket: socket() }, AttachError::DriverGone { socket: socket() }]
+    {
+        assert!(!unheard.may_be_heard(), "{unheard:?}");
+    }
 }
 
 #[test]

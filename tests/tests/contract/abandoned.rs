@@ -1,4 +1,4 @@
-//! Runs whose output nobody reads: each waits for 30 s, gives up and says so.
+//! Runs whose output nobody reads: each waits for 30 s, or 3 s from a signal on, gives up and says so.
 //!
 //! All begin before the first one is waited for, and the module's name comes first, so that they wait beside other tests.
 
@@ -48,14 +48,14 @@ fn begin_to_fill(name: &'static str, script: &str) -> Abandoned {
 }
 
 /// In real time, into a pipe that is full from the start.
-fn begin_with_a_full_pipe(name: &'static str, option: &str) -> Abandoned {
+fn begin_with_a_full_pipe(name: &'static str, option: &str, more: [&str; 2]) -> Abandoned {
     let place = Workplace::new();
     let scene = include_str!("../../../config/scenes/default.toml");
     place.write("scene.toml", scene.replace("../hands/default.csv", "hand.csv"));
     place.write("hand.csv", include_str!("../../../config/hands/default.csv"));
     let pipe = full_pipe(&place.path(name));
     let mut program = place.phantom3();
-    program.args(["run", "scene.toml", "--headless", "--seconds", "40000", option, name]);
+    program.args(["run", "scene.toml", "--headless", option, name]).args(more);
     Abandoned { name, running: Running::start(program), place, pipe }
 }
 
@@ -74,22 +74,25 @@ impl Abandoned {
         kill_process(Pid::from_child(&self.running.child), Signal::TERM).expect("our child");
     }
 
-    /// The recorder has 30 s to get on.
-    fn check_that_it_ends_with_words(mut self) {
+    /// The recorder has so long to get on.
+    fn check_that_it_ends_with_words(mut self, patience_s: u32) -> (Workplace, String) {
         self.running.child.wait_within(Duration::from_secs(120));
         let said = self.running.wait();
         assert_eq!(said.status, Some(3), "{}: {}", self.name, said.err);
-        assert!(said.err.contains("nothing was written for 30 s"), "{}: {}", self.name, said.err);
+        let words = format!("nothing was written for {patience_s} s");
+        assert!(said.err.contains(&words), "{}: {}", self.name, said.err);
         assert_eq!(self.place.processes(), Vec::<u32>::new());
+        (self.place, said.err)
     }
 }
 
 #[test]
 fn a_signal_ends_every_run_whose_output_nobody_reads() {
+    let by_itself = begin_with_a_full_pipe("short.csv", "--record", ["--seconds=1", "--record=whole.csv"]);
     let full = [
-        begin_with_a_full_pipe("out.csv", "--record"),
-        begin_with_a_full_pipe("out.mcap", "--record"),
-        begin_with_a_full_pipe("events.csv", "--events"),
+        begin_with_a_full_pipe("out.csv", "--record", LONG),
+        begin_with_a_full_pipe("out.mcap", "--record", LONG),
+        begin_with_a_full_pipe("events.csv", "--events", LONG),
     ];
     let filling = [
         begin_to_fill("a recording", "exec \"$0\" \"$@\" pipe.csv > /dev/null"),
@@ -100,9 +103,19 @@ fn a_signal_ends_every_run_whose_output_nobody_reads() {
     std::thread::sleep(Duration::from_secs(5));
     let begun = Instant::now();
     full.iter().chain(&filling).for_each(Abandoned::signal);
-    full.into_iter().chain(filling).for_each(Abandoned::check_that_it_ends_with_words);
-    assert!(begun.elapsed() < Duration::from_secs(120), "30 s are waited for: {:?}", begun.elapsed());
+    for abandoned in full.into_iter().chain(filling) {
+        abandoned.check_that_it_ends_with_words(3);
+    }
+    assert!(begun.elapsed() < Duration::from_secs(25), "3 s are waited for, not 30: {:?}", begun.elapsed());
+    let (place, said) = by_itself.check_that_it_ends_with_words(30);
+    let last_row = place.path("whole.csv").metadata().and_then(|file| file.modified());
+    let before = last_row.expect("a table").elapsed().expect("the past");
+    assert!(before > Duration::from_secs(20), "one recording waited for the other: {before:?}");
+    assert!(said.contains("finishing the recording short.csv (nothing written for "), "{said}");
 }
+
+/// Longer than anybody waits, and nothing else.
+const LONG: [&str; 2] = ["--seconds", "40000"];
 
 /// A ball in front of a camera.
 const PICTURE: &str = "\

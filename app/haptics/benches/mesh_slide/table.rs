@@ -40,6 +40,40 @@ pub(crate) fn print() {
         row(name, "no friction", &entity, path::smooth, clock_ns);
     }
     cold(&[SIZES[0], SIZES[3]], clock_ns);
+    cracks(clock_ns);
+}
+
+/// Strokes over a floor of tiles, with hairline cracks between them and without.
+fn cracks(clock_ns: u64) {
+    const TILES: i32 = 30;
+    const SIZE_M: f64 = 0.01;
+    println!("\nstroke over {TILES} x {TILES} tiles of {} mm", SIZE_M * 1e3);
+    for (name, gap_m) in [("apart", 1e-3), ("cracks of 5 um", 5e-6), ("touching", 0.0)] {
+        let tile = make::cuboid([SIZE_M - gap_m, SIZE_M, SIZE_M - gap_m]);
+        let mut floor = TriangleSoup { vertices: Vec::new(), faces: Vec::new() };
+        for place in 0..TILES * TILES {
+            let [x, z] = [place % TILES, place / TILES].map(|i| SIZE_M * f64::from(i - TILES / 2));
+            let first = floor.vertices.len() as u32;
+            floor.vertices.extend(tile.vertices.iter().map(|vertex| vertex + Vector3::new(x, 0.0, z)));
+            floor.faces.extend(tile.faces.iter().map(|face| face.map(|corner| corner + first)));
+        }
+        // A ring around the middle, half a millimetre deep.
+        let around = |tick: usize| {
+            let turn = tick as f64 * 2e-3;
+            let down_m = (5e-3 - 1e-5 * tick as f64).max(-5e-4);
+            let reach_m = 0.1 + 0.01 * (0.37 * turn).sin();
+            (Phase::Slide, Vector3::new(reach_m * turn.cos(), 0.5 * SIZE_M + down_m, reach_m * turn.sin()))
+        };
+        let path: Vec<_> = (0..20_000).map(around).collect();
+        for (friction_name, friction) in frictions() {
+            let entity = entity(&shape_of(floor.clone()), friction, Algorithm::FrictionCone);
+            let runs: Vec<_> = (0..RUNS).map(|_| tick_times(&entity, &path, clock_ns)).collect();
+            let best = |tick: usize| runs.iter().map(|run| run[tick]).min().unwrap_or(0);
+            let times = sorted((0..path.len()).map(best));
+            let [median, p99, most] = [0.5, 0.99, 1.0].map(|q| quantile(&times, q));
+            println!("{name:<16} {friction_name:<12} median {median}, p99 {p99}, max {most}");
+        }
+    }
 }
 
 fn triangles(soup: &TriangleSoup) -> String {

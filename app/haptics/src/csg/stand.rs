@@ -129,7 +129,8 @@ fn stand_anywhere(csg: &Csg, god: &mut God, input: &ConeInput) -> Option<Tangent
             }
         }
     }
-    None
+    // Flown as often as a tick has time for: it goes on from here in the next one.
+    csg.is_inside(&input.hip_B).then(|| all_around(&god.point_B, input))
 }
 
 /// What a god-object sees that cannot come nearer to the HIP, whatever is around it: all of its spring.

@@ -125,7 +125,10 @@ impl NurbsCone {
             return None;
         }
         if let Some(stand) = nurbs.meet(walker, &from_B, hip_B, self.left) {
-            return Some((stand, Beginning::Came));
+            // A ball that one place lets go may overlap another by more than it has come.
+            let came_m = (hip_B - from_B).norm() + nurbs.slack_m;
+            let how = if stand.height_m < -came_m { Beginning::WasInside } else { Beginning::Came };
+            return Some((stand, how));
         }
         let clearance_m = nurbs.clearance(hip_B) - radius_m;
         self.clear = (clearance_m > 0.0).then_some((*hip_B, clearance_m));

@@ -3,7 +3,7 @@
 use crate::common::*;
 use haptics::mesh::Sides;
 use haptics::nurbs::make;
-use haptics::{Friction, Nurbs, NurbsPatch, Surface};
+use haptics::{Finger, Friction, Nurbs, NurbsPatch, Surface};
 use nalgebra::Vector3;
 use std::sync::Arc;
 
@@ -191,6 +191,39 @@ fn a_sheet_is_felt_from_both_sides_and_left_over_its_rim() {
         }
         assert!(finger.contact(0).is_none(), "{trial}");
     }
+}
+
+/// A ball touches one place of a set at a time. Over the rim of a floor it comes with a wall in it, which it then feels as one
+/// that it was found in.
+#[test]
+fn a_ball_that_one_sheet_lets_go_in_another_feels_that_under_the_ramp() {
+    let flat = |corners: [[f64; 3]; 4]| NurbsPatch {
+        degree: [1, 1],
+        knots: [vec![0.0, 0.0, 1.0, 1.0], vec![0.0, 0.0, 1.0, 1.0]],
+        points: corners.map(|[x, y, z]| [x, y, z, 1.0]).to_vec(),
+    };
+    let floor = flat([[-0.1, 0.0, -0.1], [0.0, 0.0, -0.1], [-0.1, 0.0, 0.1], [0.0, 0.0, 0.1]]);
+    let wall = flat([[0.004, -0.1, -0.1], [0.004, 0.1, -0.1], [0.004, -0.1, 0.1], [0.004, 0.1, 0.1]]);
+    let entities = [entity(built(&[floor, wall]), Friction::None)];
+    let ramp_in_s = 0.1;
+    let mut finger = Finger::new(0.005, 1).unwrap().with_ramp_in(ramp_in_s).unwrap();
+    let (mut on_floor, mut before_n, mut overlap_m) = (0, 0.0, 0.0);
+    for tick in 0..300 {
+        let down_m = 1e-4 * f64::from(tick.min(15));
+        // It stops where it has just left the floor.
+        let along_m = 5e-5 * f64::from((tick.min(145) - 15).max(0));
+        let hip = Vector3::new(-0.004 + along_m, 0.006 - down_m, 0.0);
+        let force = finger.step(&entities, &hip, DT).force_on_user_W;
+        on_floor += usize::from(force.y > 0.1);
+        overlap_m = hip.x + 0.005 - 0.004;
+        // The way of a tick, the ramp over an overlap of no more than the ball, and roundings.
+        let most_n = before_n + K * (1e-4 + 0.005 * DT / ramp_in_s) + 1e-9;
+        assert!(force.norm() <= most_n, "tick {tick}: {force:?} after {before_n} N");
+        before_n = force.norm();
+    }
+    assert!(on_floor > 50 && overlap_m > 3e-3, "{on_floor} {overlap_m}");
+    // Roundings of a force of newtons.
+    assert!((before_n - K * overlap_m).abs() < 1e-12, "{before_n} N of {} N", K * overlap_m);
 }
 
 #[test]
