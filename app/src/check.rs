@@ -8,6 +8,7 @@
 mod common_places;
 mod measures;
 pub(crate) mod model_file;
+mod patch_file;
 mod report;
 mod summary;
 mod suspicions;

@@ -106,6 +106,28 @@ pub(crate) fn refuse_descriptors(socket: &impl AsFd) {
     };
 }
 
+/// Whether something that we sent was not read yet by the other end, which still holds it. Descriptors that were sent count
+/// against this process until then, though the other end be shut down.
+pub(crate) fn has_unread(connection: BorrowedFd<'_>) -> bool {
+    /// Not in libc for every target; include/uapi/linux/sock_diag.h: which of the words counts what was sent.
+    const SK_MEMINFO_WMEM_ALLOC: usize = 2;
+    let mut words = [0_u32; 16];
+    let mut length = size_of_val(&words) as libc::socklen_t;
+    // SAFETY: the pointers are to `length` bytes of words and to `length` itself, which outlive the call.
+    let result = unsafe {
+        libc::getsockopt(
+            connection.as_raw_fd(),
+            libc::SOL_SOCKET,
+            libc::SO_MEMINFO,
+            words.as_mut_ptr().cast(),
+            &raw mut length,
+        )
+    };
+    result == 0
+        && length as usize > SK_MEMINFO_WMEM_ALLOC * size_of::<u32>()
+        && words[SK_MEMINFO_WMEM_ALLOC] > 0
+}
+
 /// As many as the kernel allows a process.
 const MAX_GROUPS: usize = 65_536;
 

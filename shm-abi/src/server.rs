@@ -54,6 +54,8 @@ const BACKLOG: i32 = 64;
 const ACCEPT_REST: Duration = Duration::from_millis(100);
 /// How often it is looked whether a commander has mapped its segment.
 const OFFER_LOOK: Duration = Duration::from_millis(1);
+/// How often it is looked whether those who have left still hold what they were handed.
+const UNREAD_LOOK: Duration = Duration::from_millis(100);
 
 /// What the driver's loop has to know.
 #[derive(Debug)]
@@ -222,7 +224,10 @@ impl Server {
         let timeout = timespec(self.next_duty().map_or(timeout, |duty| duty.min(timeout)));
         let accepting = self.accept_after.is_none_or(|after| Instant::now() >= after);
         let mut fds = Vec::with_capacity(self.connections.len() + 2);
-        fds.extend(self.connections.iter().map(|c| PollFd::new(&c.stream, PollFlags::IN | PollFlags::RDHUP)));
+        let heard: Vec<usize> =
+            (0..self.connections.len()).filter(|i| !self.connections[*i].is_gone()).collect();
+        let stream = |index: &usize| &self.connections[*index].stream;
+        fds.extend(heard.iter().map(|index| PollFd::new(stream(index), PollFlags::IN | PollFlags::RDHUP)));
         let holder = self.holder();
         let process = holder.and_then(|(_, holder)| holder.process());
         fds.extend(process.map(|fd| PollFd::from_borrowed_fd(fd, PollFlags::IN)));
@@ -238,8 +243,9 @@ impl Server {
         let newcomer = accepting && fds.pop().is_some_and(|fd| is_ready(&fd));
         let has_ended = process.is_some() && fds.pop().is_some_and(|fd| is_ready(&fd));
         let ended = holder.filter(|_| has_ended).map(|(index, _)| index);
-        let talking = (0..fds.len()).filter(|index| is_ready(&fds[*index]) || ended == Some(*index));
-        Ok((newcomer, talking.collect()))
+        let talking = heard.into_iter().zip(&fds);
+        let talking = talking.filter(|(index, fd)| is_ready(fd) || ended == Some(*index));
+        Ok((newcomer, talking.map(|(index, _)| index).collect()))
     }
 
     /// How long until something has to be done though nobody says anything.
@@ -248,6 +254,7 @@ impl Server {
         let silence_ends = self.connections.iter().filter_map(|connection| match connection.stage {
             Stage::Asking { since, .. } => Some(since + PATIENCE),
             Stage::Commanding { offer: Some(_), .. } => Some(now + OFFER_LOOK),
+            Stage::Gone => Some(now + UNREAD_LOOK),
             _ => None,
         });
         let rest_ends = self.accept_after.filter(|after| *after > now);
@@ -308,7 +315,7 @@ impl Server {
             Heard::End => self.hang_up(index, to),
             Heard::Request(request) => {
                 let stage = self.serve(index, &request, memory, to);
-                self.connections[index].stage = stage;
+                self.connections[index].served(stage);
             }
         }
     }
@@ -394,16 +401,20 @@ impl Server {
     }
 
     fn let_observe(&self, index: usize, memory: &DriverMemory) -> Stage {
-        let observers = self.connections.iter().filter(|c| matches!(c.stage, Stage::Observing));
-        let is_administrator = self.check(index, Right::Administer).is_ok();
-        let owner = self.connections[index].owner();
-        if !places::may_observe(owner, is_administrator, observers.map(Connection::owner)) {
+        if !self.has_place_beside(index, |stage| matches!(stage, Stage::Observing | Stage::Gone)) {
             return self.refuse(index, Verdict::Crowded);
         }
         match self.answer(index, &Answer::new(Verdict::Granted), &[memory.fd()]) {
             Ok(()) => Stage::Observing,
             Err(_) => Stage::Gone,
         }
+    }
+
+    /// Whether there is a place for one more who is sent descriptors, beside those at this stage.
+    fn has_place_beside(&self, index: usize, counts: impl Fn(&Stage) -> bool) -> bool {
+        let others = self.connections.iter().filter(|connection| counts(&connection.stage));
+        let is_administrator = self.check(index, Right::Administer).is_ok();
+        places::may_observe(self.connections[index].owner(), is_administrator, others.map(Connection::owner))
     }
 
     fn lease_to(
@@ -417,6 +428,9 @@ impl Server {
         if self.holder().is_some() {
             let _ = to.take(ServerEvent::LeaseRefused);
             return self.refuse(index, Verdict::LeaseHeld);
+        }
+        if !self.has_place_beside(index, |stage| matches!(stage, Stage::Gone)) {
+            return self.refuse(index, Verdict::Crowded);
         }
         let connection = &self.connections[index];
         let process = Process::of(connection.stream.as_fd(), &connection.peer);
@@ -525,7 +539,7 @@ impl Server {
     }
 
     fn forget_the_gone(&mut self) {
-        self.connections.retain(|connection| !matches!(connection.stage, Stage::Gone));
+        self.connections.retain(|connection| !connection.is_gone() || connection.holds_descriptors());
     }
 }
 

@@ -153,7 +153,7 @@ fn drawn_corners(spec: &ShapeSpec, shape: &Shape) -> Option<[Vector3<f64>; 2]> {
     around(triangles(spec, Some(shape))?.places.iter().map(|place| place.coords))
 }
 
-fn around(mut points: impl Iterator<Item = Vector3<f64>>) -> Option<[Vector3<f64>; 2]> {
+pub(super) fn around(mut points: impl Iterator<Item = Vector3<f64>>) -> Option<[Vector3<f64>; 2]> {
     let first = points.next()?;
     Some(points.fold([first; 2], |[least, most], point| [least.inf(&point), most.sup(&point)]))
 }

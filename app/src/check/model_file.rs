@@ -5,7 +5,7 @@
 //! their own. A file that was written so has nothing left to repair, but for edges along which parts touch: their vertices are
 //! in the same places, and are merged and parted again.
 
-use super::CheckArgs;
+use super::{CheckArgs, patch_file};
 use crate::outputs::{self, Output};
 use haptics::mesh::{CloseHoles, Mesh, MeshReport, Sides};
 use io_driver::say::say;
@@ -22,6 +22,11 @@ use world::model::{self, FaceNames, ModelError};
 /// written.
 pub(crate) fn execute(args: &CheckArgs) -> ExitCode {
     let found = understand(args);
+    if let Err(NotUnderstood::Model(_)) = &found
+        && let Some(told) = patch_file::execute(args)
+    {
+        return told;
+    }
     let written = match (&found, &args.repair) {
         (Ok(understood), Some(out)) => understood.write(out),
         _ => Ok(()),

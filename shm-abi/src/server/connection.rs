@@ -2,7 +2,7 @@
 
 use super::places::Owner;
 use crate::handshake::Request;
-use crate::peer::{Peer, Process};
+use crate::peer::{Peer, Process, has_unread};
 use crate::segment::LeaseOffer;
 use bytemuck::Zeroable;
 use rustix::event::{PollFd, PollFlags, Timespec, poll};
@@ -17,6 +17,8 @@ pub(super) struct Connection {
     pub(super) stream: UnixStream,
     pub(super) peer: Peer,
     pub(super) stage: Stage,
+    /// It was sent some.
+    has_descriptors: bool,
 }
 
 #[derive(Debug)]
@@ -33,7 +35,7 @@ pub(super) enum Stage {
         /// The loop knows nothing of the lease as long as there is one.
         offer: Option<LeaseOffer>,
     },
-    /// To be forgotten.
+    /// To be forgotten, as soon as it holds nothing of ours.
     Gone,
 }
 
@@ -47,7 +49,22 @@ pub(super) enum Heard {
 impl Connection {
     pub(super) fn new(stream: UnixStream, peer: Peer) -> Self {
         let stage = Stage::Asking { bytes: [0; size_of::<Request>()], filled: 0, since: Instant::now() };
-        Self { stream, peer, stage }
+        Self { stream, peer, stage, has_descriptors: false }
+    }
+
+    /// Goes on to where its request has led it.
+    pub(super) fn served(&mut self, stage: Stage) {
+        self.has_descriptors |= matches!(stage, Stage::Observing | Stage::Commanding { .. });
+        self.stage = stage;
+    }
+
+    pub(super) fn is_gone(&self) -> bool {
+        matches!(self.stage, Stage::Gone)
+    }
+
+    /// Whether descriptors that it was sent lie there unread: they count against the driver, so that it keeps its place.
+    pub(super) fn holds_descriptors(&self) -> bool {
+        self.has_descriptors && has_unread(self.stream.as_fd())
     }
 
     pub(super) fn owner(&self) -> Owner {

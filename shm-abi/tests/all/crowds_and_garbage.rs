@@ -4,12 +4,14 @@ use crate::common::desk::{Desk, SHORT, is_closed, verdict};
 use crate::common::fake::fake_server;
 use crate::common::host::Host;
 use crate::common::{directory, wait_until};
+use bytemuck::Zeroable;
 use patience::limit;
 use patience::prelude::*;
 use shm_abi::client::{self, AttachError};
 use shm_abi::handshake::{Answer, Request, RequestKind, Verdict};
 use shm_abi::server::{MAX_ASKING, MAX_OBSERVERS_OF_PROCESS, PATIENCE};
-use std::io::Write;
+use std::io::{Read, Write};
+use std::net::Shutdown;
 use std::os::fd::AsFd;
 use std::os::unix::net::UnixStream;
 use std::time::{Duration, Instant};
@@ -28,6 +30,39 @@ fn observers_in_any_number_leave_room_for_a_commander_and_a_stop() {
     drop(observers);
     wait_until("a place is free again", || client::observe(&host.socket, "looker").is_ok());
     drop(commander);
+}
+
+/// What lies unread counts against the driver's own limit of descriptors, though whoever asked for it has shut down.
+#[test]
+fn who_leaves_without_taking_what_was_handed_over_keeps_the_place() {
+    let mut desk = Desk::open();
+    let mut leave_behind = |kind| {
+        let mut stream = desk.connect();
+        stream.write_all(bytemuck::bytes_of(&Request::new(kind, "hoarder"))).unwrap();
+        desk.poll(SHORT);
+        stream.shutdown(Shutdown::Both).unwrap();
+        desk.poll(SHORT);
+        stream
+    };
+    let asks = MAX_OBSERVERS_OF_PROCESS + 6;
+    let observers: Vec<_> = (0..asks).map(|_| leave_behind(RequestKind::Observe)).collect();
+    let commanders: Vec<_> = (0..4).map(|_| leave_behind(RequestKind::Command)).collect();
+    let granted = |streams: &[UnixStream]| {
+        streams.iter().filter(|stream| verdict_after_shutdown(stream) == Some(Verdict::Granted)).count()
+    };
+    assert_eq!(granted(&observers), MAX_OBSERVERS_OF_PROCESS);
+    assert_eq!(granted(&commanders), 0, "the process has too many places already");
+    // What was read holds nothing any more.
+    desk.poll(SHORT);
+    desk.poll(SHORT);
+    desk.granted(RequestKind::Observe);
+}
+
+/// What lies there for one that has shut down its end.
+fn verdict_after_shutdown(mut stream: &UnixStream) -> Option<Verdict> {
+    let mut answer = Answer::zeroed();
+    stream.read_exact(bytemuck::bytes_of_mut(&mut answer)).ok()?;
+    Verdict::from_word(answer.verdict)
 }
 
 #[test]
@@ -174,7 +209,7 @@ fn no_bytes_but_a_true_request_are_ever_granted() {
                 let _ = stream.write_all(piece);
                 desk.poll(Duration::ZERO);
             }
-            let _ = stream.shutdown(std::net::Shutdown::Write);
+            let _ = stream.shutdown(Shutdown::Write);
             desk.poll(Duration::ZERO);
             prop_assert_ne!(verdict(&mut stream), Some(Verdict::Granted));
             prop_assert!(desk.events.is_empty(), "{:?}", desk.events);

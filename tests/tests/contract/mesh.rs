@@ -459,6 +459,38 @@ fn check_tells_how_a_model_is_understood_and_writes_what_needs_no_repair() {
     }
 }
 
+/// A flat bicubic patch of 0.3 m x 0.6 m.
+const PATCH: &str = "\
+v 0 0 0\nv 0.1 0 0\nv 0.2 0 0\nv 0.3 0 0\nv 0 0 0.2\nv 0.1 0 0.2\nv 0.2 0 0.2\nv 0.3 0 0.2
+v 0 0 0.4\nv 0.1 0 0.4\nv 0.2 0 0.4\nv 0.3 0 0.4\nv 0 0 0.6\nv 0.1 0 0.6\nv 0.2 0 0.6\nv 0.3 0 0.6
+cstype bezier\ndeg 3 3\nsurf 0 1 0 1 1 2 3 4 5 6 7 8 9 10 11 12 13 14 15 16\nparm u 0 1\nparm v 0 1\nend
+";
+
+#[test]
+fn check_tells_how_patches_are_understood_and_what_a_scene_says_of_them() {
+    let place = Workplace::new();
+    place.write("patch.obj", PATCH);
+    let said = place.run(["check", "patch.obj"]);
+    assert_eq!(said.status, Some(0), "{said:?}");
+    for words in [
+        "1 patches of 1 polynomials",
+        "a sheet",
+        "size           0.3 x 0 x 0.6\n",
+        "patch.obj: can be felt\n",
+    ] {
+        assert!(said.out.contains(words), "`{words}` is missing in: {}", said.out);
+    }
+    let shape =
+        said.out.lines().find_map(|line| line.strip_prefix("scene ")).expect("a line for scenes").trim();
+    place.write("scene.toml", format!("[[finger]]\n[[entity]]\n{shape}\n"));
+    let said = place.run(["check", "scene.toml"]);
+    assert_eq!(said.status, Some(0), "{said:?}");
+    let said = place.run(["check", "patch.obj", "--json"]);
+    assert!(said.out.contains("\"patches\": 1"), "{said:?}");
+    let said = place.run(["check", "patch.obj", "--repair", "out.obj"]);
+    assert_eq!(said.status, Some(2), "{said:?}");
+}
+
 #[test]
 fn check_refuses_models_outputs_and_options_that_do_not_fit() {
     let place = Workplace::new();

@@ -149,6 +149,20 @@ impl Curved {
         self.turn_LB.try_inverse().map(|turn_BL| turn_BL * tip_L)
     }
 
+    /// Whether a point in the tip of a cone, seen from inside of it, is the nearest of all its side to the HIP.
+    pub(super) fn holds_in_tip(&self, point_B: &Vector3<f64>, hip_B: &Vector3<f64>, near_m: f64) -> bool {
+        let Kind::Nappe { normal_rho, normal_y, .. } = self.kind else { return false };
+        let at_L = self.local(point_B);
+        if at_L.x.hypot(at_L.z) > near_m * self.stretch {
+            return false;
+        }
+        // Along a line of the side, `n_y` out and `n_rho` down in L, the way to the HIP falls by its product with this.
+        self.turn_LB.try_inverse().is_some_and(|turn_BL| {
+            let pull_L = turn_BL.tr_mul(&(hip_B - point_B));
+            normal_y.abs() * pull_L.x.hypot(pull_L.z) <= normal_rho * normal_y.signum() * pull_L.y
+        })
+    }
+
     pub(super) fn cross(
         &self,
         from_B: &Vector3<f64>,

@@ -69,7 +69,7 @@ pub(super) fn on_patch(
     input: &ConeInput,
 ) -> Option<TangentView> {
     let is_turned = god.sides & god.active != 0;
-    let view = view_of_patch(patch, is_turned, point_B, &look.normal_B, input);
+    let view = view_of_patch(csg, patch, is_turned, point_B, &look.normal_B, input);
     let is_held = look.height_m.abs() <= csg.tolerance_m() && view.depth_m >= -RELEASE * csg.extent_m;
     is_held.then_some(view)
 }
@@ -174,7 +174,7 @@ fn held(csg: &Csg, god: &mut God, corner: &Corner, input: &ConeInput) -> Held {
     let by_patch = |god: &God, index: usize, place: usize| {
         let is_turned = god.sides >> index & 1 == 1;
         let patch = god.near.patch(csg, index);
-        view_of_patch(patch, is_turned, &god.point_B, &corner.normals_B[place], input)
+        view_of_patch(csg, patch, is_turned, &god.point_B, &corner.normals_B[place], input)
     };
     if corner.count <= 1 {
         let index = corner.indices[0];
@@ -219,12 +219,16 @@ fn deepest_wall(god: &God, corner: &Corner, to_hip_B: &Vector3<f64>) -> Option<u
 
 #[inline(always)]
 fn view_of_patch(
+    csg: &Csg,
     patch: &Patch,
     is_turned: bool,
     point_B: &Vector3<f64>,
     normal_B: &Vector3<f64>,
     input: &ConeInput,
 ) -> TangentView {
+    if is_turned && patch.holds_in_tip(point_B, &input.hip_B, csg.tight_m()) {
+        return all_around(point_B, input);
+    }
     let normal_B = if is_turned { -normal_B } else { *normal_B };
     let offset_m = match patch {
         Patch::Plane { offset_m, .. } if is_turned => -offset_m,
