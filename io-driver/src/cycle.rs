@@ -14,6 +14,7 @@
 //! Cost: linear in the devices; no allocation, lock, system call (but a wake-up, if the commander sleeps) or
 //! panic.
 
+use crate::bell_thread::BellRope;
 use crate::device::{Device, Effort, Extras, Reading, TickTime};
 use crate::meter::{bump, record};
 use crate::reply::Reply;
@@ -76,6 +77,8 @@ pub struct Cycle {
     rang_ns: u64,
     /// Told of every fault.
     urgent: Urgent,
+    /// Who wakes a commander that sleeps; `None`: the cycle itself, which has no deadlines then.
+    bell: Option<Arc<BellRope>>,
 }
 
 impl Cycle {
@@ -114,7 +117,14 @@ impl Cycle {
             started_ns: 0,
             rang_ns: 0,
             urgent: Urgent::default(),
+            bell: None,
         }
+    }
+
+    /// The same, for a loop with deadlines, whose commander somebody else wakes.
+    pub fn with_bell(mut self, bell: Option<Arc<BellRope>>) -> Self {
+        self.bell = bell;
+        self
     }
 
     /// The same, whose faults cannot be left by requests of before.
@@ -244,7 +254,16 @@ impl Cycle {
         self.describe(time, deadline_ns);
         self.memory.write_frame(&self.frame);
         self.rang_ns = monotonic_ns();
-        self.memory.ring(tick, self.lease.as_ref());
+        match &self.bell {
+            Some(bell) => {
+                if self.memory.tell_frame(tick, self.lease.as_ref()) {
+                    bell.pull();
+                }
+            }
+            None => {
+                self.memory.ring(tick, self.lease.as_ref());
+            }
+        }
         self.reply.round_trip_ns = 0;
     }
 

@@ -5,6 +5,7 @@
 //! memory, give up all rights, listen, start the threads that stop and that log, shut the sandbox, go. Whatever ends the
 //! process, the loop writes zero first.
 
+use crate::bell_thread::BellThread;
 use crate::config::{DriverConfig, ReplyMode};
 use crate::cycle::{Cycle, Freshness, Protection};
 use crate::device::Device;
@@ -159,14 +160,26 @@ pub fn run(config: &DriverConfig, options: &RunOptions) -> Result<(), RunError> 
     install_last_words(&memory)?;
     let (sender, inbox) = mail();
     let (log, drain) = rt_core::log::channel(LOG_CAPACITY);
-    let cycle = make_cycle(config, Arc::clone(&memory), devices).telling_of_faults(sender.urgent.clone());
+    // In lockstep nobody has deadlines.
+    let bell = (config.clock == ClockMode::Real)
+        .then(|| {
+            let priority = loop_thread::priority(config).filter(|_| has_real_time);
+            BellThread::spawn(Arc::clone(&memory), priority, loop_thread::loop_cpu(config))
+        })
+        .transpose()
+        .map_err(no_thread("wake commanders"))?;
+    let rope = bell.as_ref().map(|bell| Arc::clone(&bell.rope));
+    let cycle = make_cycle(config, Arc::clone(&memory), devices)
+        .telling_of_faults(sender.urgent.clone())
+        .with_bell(rope.clone());
     let real_loop = RealLoop::new(config, waiting, cycle, inbox, log, shared.clone(), &TICK);
     // From here on nothing new that the loop touches: it would not be locked.
     let named = options.socket.clone().or_else(|| config.socket.clone()).or_else(shm_abi::endpoint::named);
     // The usual places may be made without a word; a name that is mistyped is told by what it makes.
     let missing = named.as_deref().and_then(missing_directory);
     let path = named.unwrap_or_else(shm_abi::endpoint::for_driver);
-    give_up_rights(user.as_ref(), &path, &mut report, (&starter, &stops))?;
+    give_up_rights(user.as_ref(), &path, &mut report, (&starter, &stops, bell.as_ref()))?;
+    drop(bell);
     if user.is_some() {
         // The kernel forgets the request when the user changes.
         die_with_parent(options)?;
@@ -193,8 +206,19 @@ pub fn run(config: &DriverConfig, options: &RunOptions) -> Result<(), RunError> 
     say(options, format_args!("listening at {}", server.path().display()));
     let thread = starter.start(real_loop);
     supervisor.ready(&format!("listening at {}", server.path().display()));
-    let service =
-        Service { server, stop_file, sender, lost, memory, signals, heartbeat, shared, options, supervisor };
+    let service = Service {
+        server,
+        stop_file,
+        sender,
+        rope,
+        lost,
+        memory,
+        signals,
+        heartbeat,
+        shared,
+        options,
+        supervisor,
+    };
     service.run(thread)
 }
 
@@ -264,7 +288,7 @@ fn give_up_rights(
     user: Option<&User>,
     socket: &Path,
     report: &mut SetupReport,
-    (starter, stops): (&loop_thread::Starter, &stop_thread::Starter),
+    (starter, stops, bell): (&loop_thread::Starter, &stop_thread::Starter, Option<&BellThread>),
 ) -> Result<(), RunError> {
     if let Some(user) = user {
         sandbox::make_directory_for(user, socket);
@@ -272,6 +296,9 @@ fn give_up_rights(
     let others = |keep| {
         starter.give_up_rights(keep);
         stops.give_up_rights(keep);
+        if let Some(bell) = bell {
+            bell.give_up_rights(keep);
+        }
     };
     Ok(sandbox::give_up_rights(user, report, others)?)
 }

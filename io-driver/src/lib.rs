@@ -13,6 +13,7 @@
 #![deny(missing_docs)]
 
 pub mod arguments;
+pub mod bell_thread;
 pub mod cli;
 pub mod commission;
 pub mod config;
@@ -46,6 +47,7 @@ mod service;
 pub mod sim;
 mod state_log;
 pub mod status;
+
 mod stop_thread;
 pub mod supervisor;
 pub mod table;

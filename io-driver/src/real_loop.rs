@@ -35,6 +35,8 @@ use std::time::Duration;
 
 /// How long a sleeping loop goes without looking at its mail and at requests to stop.
 const NAP: Duration = Duration::from_millis(10);
+/// At least so long is slept before a reply is looked for again (ns).
+const LOOK_NS: u64 = 20_000;
 
 /// Spinning without any reply for so long does no good: many times what a reply takes, and rare even among stalls of a
 /// virtual machine.
@@ -262,6 +264,7 @@ impl RealLoop {
         let has_begun = self.cycle.seen_reply().is_some();
         let may_spin = has_begun && until_ns >= self.retreat_until_ns;
         let wait_mode = if may_spin { self.wait_mode } else { WaitMode::Futex };
+        let begun_ns = monotonic_ns();
         while !self.cycle.take_reply() {
             let now = monotonic_ns();
             if now >= until_ns {
@@ -269,7 +272,12 @@ impl RealLoop {
             }
             match wait_mode {
                 WaitMode::Spin => spin_loop(),
-                WaitMode::Futex => self.sleep_for_reply(Duration::from_nanos(until_ns - now)),
+                // Not on the commander's bell: whoever sleeps or wakes there waits for everybody in the same bucket of the
+                // kernel's table. The longer it takes the less it matters how exactly its end is met.
+                WaitMode::Futex => {
+                    let look_ns = LOOK_NS.max(now.saturating_sub(begun_ns) / 4);
+                    sleep_until_ns(until_ns.min(now + look_ns));
+                }
             }
         }
         self.unanswered_ticks = 0;

@@ -6,6 +6,7 @@
 //! room is dropped or refused). It posts first and speaks after. The loop does not wait for it either: it reads the
 //! flag of signals itself, and [`stop_thread`](crate::stop_thread) can stop the motors without it.
 
+use crate::bell_thread::BellRope;
 use crate::driver::{RunError, RunOptions, TICK};
 use crate::heartbeat::Heartbeat;
 use crate::mail::{Letter, Sender};
@@ -49,6 +50,8 @@ pub(crate) struct Service<'a> {
     /// Removed at the end.
     pub(crate) stop_file: SocketFile,
     pub(crate) sender: Sender,
+    /// Of who wakes commanders; in lockstep there is none.
+    pub(crate) rope: Option<Arc<BellRope>>,
     /// Of the loop's own log.
     pub(crate) lost: LostCount,
     pub(crate) memory: Arc<DriverMemory>,
@@ -71,8 +74,8 @@ impl Service<'_> {
     fn serve(&mut self) -> Result<String, String> {
         loop {
             self.heartbeat.beat();
-            let Self { server, sender, memory, options, .. } = self;
-            let mut desk = Desk { sender, memory, options, stop: None };
+            let Self { server, sender, rope, memory, options, .. } = self;
+            let mut desk = Desk { sender, rope: rope.as_deref(), memory, options, stop: None };
             let polled = server.poll(memory, POLL, &mut desk);
             if let Some(reason) = desk.stop {
                 return Ok(reason);
@@ -148,6 +151,8 @@ impl Service<'_> {
 /// Passes on to the loop what clients ask for: first that, then the words.
 struct Desk<'a> {
     sender: &'a mut Sender,
+    /// Where to say whom to wake.
+    rope: Option<&'a BellRope>,
     memory: &'a DriverMemory,
     options: &'a RunOptions,
     /// Why to stop.
@@ -159,6 +164,9 @@ impl Recipient for Desk<'_> {
         match event {
             ServerEvent::LeaseGranted { view, pid, name } => {
                 let lease = view.lease();
+                if let Some(rope) = self.rope {
+                    rope.wakes(view.sleeper());
+                }
                 self.post(Letter::Grant(view))?;
                 bump(&self.memory.counters.leases_granted);
                 say(self.options, format_args!("lease {lease} to {} ({name})", ProcessWords(pid)));

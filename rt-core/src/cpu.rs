@@ -49,6 +49,14 @@ fn may_move_to(cpu: usize) -> bool {
     attempt.join().unwrap_or(false)
 }
 
+/// Has the calling thread run on any CPU that it may but this one. Where there is no other it stays.
+pub fn leave(cpu: usize) {
+    let calling_thread = Pid::from_raw(0);
+    let Ok(mut mask) = sched_getaffinity(calling_thread) else { return };
+    // A mask without any CPU is refused.
+    let _ = mask.unset(cpu).and_then(|()| sched_setaffinity(calling_thread, &mask));
+}
+
 /// The CPU that the calling thread runs on now; it may be another one right after, unless pinned.
 #[must_use]
 pub fn current_cpu() -> usize {

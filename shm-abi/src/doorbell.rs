@@ -10,12 +10,12 @@
 //! never on a sequence word, which is odd for part of the time.
 //!
 //! The driver's doorbell lies in memory that every observer maps, and waking costs by the sleeper. So the commander
-//! sleeps on a word of its own segment, which the driver changes and rings while the flag says so, and observers
-//! look by the clock.
+//! sleeps on a word of its own segment, which the driver changes and has rung while the flag says so, and observers
+//! look by the clock. A wake also walks past the sleepers of whatever word shares a bucket of the kernel's table, whoever they
+//! are: a loop with deadlines neither wakes nor sleeps so.
 //!
 //! Invariant: a sleeper that saw an old number is woken by the next ring (loom test).
-//! Cost: ringing is two stores, a fence and a load; if the flag is up, one system call more, which wakes one thread
-//! (eight for a commander of before 1.3), however many sleep.
+//! Cost: ringing is two stores, a fence and a load; if the flag is up, one system call more.
 
 use crate::enumeration::from_word;
 use crate::layout::{Bell, SLEEPS_ON_OTHERS_BELL, SLEEPS_ON_OWN_WORD};
@@ -70,17 +70,24 @@ pub fn ring(bell: &Bell, k: u64, sleeps: &AtomicU64) {
     }
 }
 
-/// As [`ring`], from the driver's loop, which anybody may try to stall by sleeping on the bell that all share: it
-/// wakes one sleeper on the commander's own word, or, for a commander that sleeps on the shared bell, as those of
-/// before 1.3 do, [`OLD_SLEEPERS`] there, the kernel choosing them by priority. Returns how many were woken.
-pub fn ring_frame(bell: &Bell, k: u64, sleeps: &AtomicU64, own_word: &AtomicU32) -> usize {
+/// As [`ring`], from the driver's loop, which wakes nobody itself: says whether the commander sleeps, whose own word it
+/// changes then. Whoever is told so wakes it by [`wake_sleeper`].
+pub fn tell_frame(bell: &Bell, k: u64, sleeps: &AtomicU64, own_word: &AtomicU32) -> bool {
     tell(bell, k);
+    let place = sleeper(sleeps);
+    if place == SLEEPS_ON_OWN_WORD {
+        own_word.store(low_half(k), Ordering::Release);
+    }
+    place != 0
+}
+
+/// Wakes a commander that sleeps: one sleeper on its own word, or, for one that sleeps on the bell that all share, as those of
+/// before 1.3 do, [`OLD_SLEEPERS`] there, the kernel choosing them by priority. Returns how many were woken. However few, it
+/// takes as long as there are sleepers in the same bucket of the kernel's table, of whatever process.
+pub fn wake_sleeper(bell: &Bell, sleeps: &AtomicU64, own_word: &AtomicU32) -> usize {
     match sleeper(sleeps) {
         0 => 0,
-        SLEEPS_ON_OWN_WORD => {
-            own_word.store(low_half(k), Ordering::Release);
-            wake_some(own_word, 1)
-        }
+        SLEEPS_ON_OWN_WORD => wake_some(own_word, 1),
         _ => wake_some(&bell.doorbell, OLD_SLEEPERS),
     }
 }

@@ -15,7 +15,7 @@ mod offer;
 mod text;
 
 pub use bounds::SHORTEST_PERIOD_NS;
-pub use commander::{CommanderMemory, CommanderView};
+pub use commander::{CommanderMemory, CommanderView, Sleeper};
 pub use description::{ClockMode, DeviceInfo, DriverInfo};
 pub use driver::{DriverMemory, DriverView, FrameUnavailable};
 pub use offer::{LeaseOffer, MAPPED_WITHIN, TAKEN_WITHIN};

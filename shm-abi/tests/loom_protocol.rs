@@ -266,7 +266,7 @@ struct Bell {
 }
 
 impl Bell {
-    /// The order of steps is that of `doorbell::ring_frame` for a commander that sleeps on its own word.
+    /// The order of steps is that of `doorbell::tell_frame` and `wake_sleeper` for a commander that sleeps on its own word.
     fn ring_own_word(&self, k: u64) {
         announce(&self.latest_plus_one, k);
         if sleeper(&self.reader_sleeps) == SLEEPS_ON_OWN_WORD {

@@ -19,8 +19,9 @@ pub const ALLOWED_CALLS: &[AllowedCall] = &[
         "futex",
         libc::SYS_futex,
         Any,
-        "sleep for a reply, wake the commander; locks, joining the loop's thread",
+        "waking the commander, in lockstep sleeping for its reply; locks, joining the loop's thread",
     ),
+    call("read", libc::SYS_read, Any, "the loop has asked to wake the commander"),
     call(
         "clock_gettime",
         libc::SYS_clock_gettime,
@@ -62,7 +63,7 @@ pub const ALLOWED_CALLS: &[AllowedCall] = &[
     call("mremap", libc::SYS_mremap, Any, "a large allocation grows"),
     call("madvise", libc::SYS_madvise, Any, "heap given back; the stack of a thread that ends"),
     // Words.
-    call("write", libc::SYS_write, Any, "the log, on standard error"),
+    call("write", libc::SYS_write, Any, "the log, on standard error; the loop asks to wake the commander"),
     call("writev", libc::SYS_writev, Any, "the C library's own last message (heap corrupted, stack smashed)"),
     call(
         "pread64",

@@ -12,6 +12,7 @@ use crate::seqlock::{self, Torn};
 use rustix::fs::SealFlags;
 use std::ops::Deref;
 use std::os::fd::{BorrowedFd, OwnedFd};
+use std::sync::Arc;
 use std::sync::atomic::Ordering;
 use std::time::Duration;
 
@@ -57,10 +58,27 @@ impl Deref for CommanderMemory {
     }
 }
 
+/// A commander that may sleep, for whoever wakes it instead of the loop.
+#[derive(Debug, Clone)]
+pub struct Sleeper {
+    map: Arc<Mapping<CommanderSegment>>,
+}
+
+impl Sleeper {
+    /// Wakes it if it sleeps, on its own word or on this driver's bell. Takes as long as the kernel's bucket is full.
+    pub fn wake(&self, driver: &DriverMemory) {
+        wake(&self.map, driver);
+    }
+}
+
+pub(super) fn wake(commander: &CommanderSegment, driver: &DriverMemory) -> usize {
+    doorbell::wake_sleeper(&driver.map.bell, &commander.bell.owner_sleeps, &commander.header.frame_doorbell)
+}
+
 /// The commander's segment, in the driver, which writes nothing into it but the word to sleep on.
 #[derive(Debug)]
 pub struct CommanderView {
-    pub(super) map: Mapping<CommanderSegment>,
+    pub(super) map: Arc<Mapping<CommanderSegment>>,
     lease: u64,
     /// Keeps its page from being merged, once the commander can no longer take it away.
     pages: Option<OwnedFd>,
@@ -79,7 +97,7 @@ impl CommanderView {
         put(&header.segment_bytes, size_of::<CommanderSegment>() as u64);
         put(&header.lease, lease);
         seal(&fd, SealFlags::SHRINK | SealFlags::GROW)?;
-        Ok((Self { map, lease, pages: None }, fd))
+        Ok((Self { map: Arc::new(map), lease, pages: None }, fd))
     }
 
     /// Number of the lease; the driver's own knowledge, not read from the segment.
@@ -100,7 +118,12 @@ impl CommanderView {
         seqlock::read(&slot.sequence, &slot.words, words_of_mut(command)).map(|_| ())
     }
 
-    /// Sleeps until the commander rings, `timeout` passes or a signal comes.
+    /// The commander as somebody else wakes it.
+    pub fn sleeper(&self) -> Sleeper {
+        Sleeper { map: Arc::clone(&self.map) }
+    }
+
+    /// Sleeps until the commander rings, `timeout` passes or a signal comes. For whoever has no deadlines.
     pub fn sleep_for_command(&self, seen: Option<u64>, own: &DriverMemory, timeout: Duration) {
         let bell = &self.map.bell;
         doorbell::sleep(Place::bell(bell), bell, seen, &own.map.bell.owner_sleeps, timeout);

@@ -1,5 +1,6 @@
 //! The driver's segment: written by the driver, read by everybody else.
 
+use super::commander::wake;
 use super::description::{describe, device_count};
 use super::mapping::{Mapping, check, close_to_others, create_memfd, keep_apart, seal};
 use super::text::{lines_of, put_text};
@@ -77,17 +78,25 @@ impl DriverMemory {
         seqlock::write(&slot.sequence, &slot.words[..used], &words_of(frame)[..used], frame.tick);
     }
 
-    /// Announces frame `tick` and wakes the commander if it sleeps. Returns how many sleepers were woken.
+    /// Announces frame `tick` and wakes the commander if it sleeps. Returns how many sleepers were woken. For whoever has no
+    /// deadlines; see [`tell_frame`](Self::tell_frame).
     #[inline]
     pub fn ring(&self, tick: u64, commander: Option<&CommanderView>) -> usize {
+        let sleeps = self.tell_frame(tick, commander);
+        commander.filter(|_| sleeps).map_or(0, |view| wake(&view.map, self))
+    }
+
+    /// Announces frame `tick` and wakes nobody; says whether the commander sleeps. Fit for the loop.
+    #[inline]
+    pub fn tell_frame(&self, tick: u64, commander: Option<&CommanderView>) -> bool {
+        let bell = &self.map.bell;
         match commander {
             Some(view) => {
-                let own = &view.map;
-                doorbell::ring_frame(&self.map.bell, tick, &own.bell.owner_sleeps, &own.header.frame_doorbell)
+                doorbell::tell_frame(bell, tick, &view.map.bell.owner_sleeps, &view.map.header.frame_doorbell)
             }
             None => {
-                doorbell::tell(&self.map.bell, tick);
-                0
+                doorbell::tell(bell, tick);
+                false
             }
         }
     }
