@@ -8,7 +8,7 @@
 //! [`ServerEvent`]s, for the loop, before whoever asked gets an answer.
 //!
 //! Who got an answer and has nothing to keep is hung up on at once; observers and silent newcomers have bounded places
-//! (`server/places.rs`). Newcomers are taken in bounded batches, and a flood of them makes the listener rest.
+//! (`server/places.rs`), and whoever leaves without having read the descriptors that it was sent keeps its place. Newcomers are taken in bounded batches, and a flood of them makes the listener rest.
 //!
 //! Invariant: nothing a client sends or withholds blocks the thread; a client that connects and says
 //! nothing is dropped after [`PATIENCE`], and one that says more than its request, at once: what nobody
@@ -18,17 +18,19 @@
 
 mod connection;
 mod places;
+mod sealer;
 
 use crate::handshake::{self, Answer, Request, RequestKind, Verdict};
 use crate::peer::{Peer, Process, ProcessWords, refuse_descriptors};
 use crate::rights::{Right, Rights};
-use crate::segment::{CommanderView, DriverMemory, LeaseOffer};
+use crate::segment::{CommanderView, DriverMemory, LeaseOffer, SegmentError};
 use crate::socket;
 use crate::socket_file::{Lock, SocketFile, make_sure_nobody_listens, without_end};
-use connection::{Connection, Heard, Stage, timespec};
+use connection::{Connection, Heard, Offer, Stage, timespec};
 use rustix::event::{PollFd, PollFlags, poll};
 use rustix::io::Errno;
 use rustix::net::SocketFlags;
+use sealer::Sealer;
 use std::io;
 use std::os::fd::{AsFd, BorrowedFd};
 use std::os::unix::fs::DirBuilderExt;
@@ -139,6 +141,7 @@ pub struct Server {
     file: SocketFile,
     _lock: Lock,
     rights: Rights,
+    sealer: Sealer,
     connections: Vec<Connection>,
     next_lease: u64,
     accept_after: Option<Instant>,
@@ -177,11 +180,13 @@ impl Server {
         };
         let (listener, file) = SocketFile::make(path, |path| UnixListener::bind(path), prepare)?;
         let connections = Vec::with_capacity(MAX_CONNECTIONS);
+        let sealer = Sealer::start().map_err(|source| BindError::system("start a thread", path, source))?;
         Ok(Self {
             listener,
             file,
             _lock: lock,
             rights,
+            sealer,
             connections,
             next_lease: 1,
             accept_after: None,
@@ -450,27 +455,49 @@ impl Server {
             return Stage::Gone;
         }
         self.next_lease += 1;
-        Stage::Commanding { lease, name: handshake::name_text(&request.name), process, offer: Some(offer) }
+        Stage::Commanding {
+            lease,
+            name: handshake::name_text(&request.name),
+            process,
+            offer: Some(Offer::Made(offer)),
+        }
     }
 
-    /// Puts into force what was offered, once nobody can take its memory away any more.
+    /// Has sealed what was offered and mapped, and puts into force what is sealed: nobody can take its memory away any more.
     fn grant_what_is_mapped(&mut self, to: &mut impl Recipient) {
-        for connection in &mut self.connections {
-            let pid = u64::from(connection.peer.pid);
-            let Stage::Commanding { name, offer, .. } = &mut connection.stage else { continue };
-            let Some(mapped) = offer.take_if(|offer| offer.is_mapped()) else { continue };
-            let name = name.clone();
-            let is_granted = match mapped.seal() {
-                Ok(view) => to.take(ServerEvent::LeaseGranted { view, pid, name }).is_ok(),
-                Err(error) => {
-                    let message = format!("{} ({name}) gets no lease: {error}", ProcessWords(pid));
-                    let _ = to.take(ServerEvent::Trouble { message });
-                    false
-                }
-            };
-            if !is_granted {
-                connection.stage = Stage::Gone;
+        let Self { connections, sealer, .. } = self;
+        for connection in connections.iter_mut() {
+            let Stage::Commanding { lease, offer, .. } = &mut connection.stage else { continue };
+            let is_mapped = |offer: &mut Offer| matches!(offer, Offer::Made(made) if made.is_mapped());
+            let Some(Offer::Made(mapped)) = offer.take_if(is_mapped) else { continue };
+            *offer = Some(match sealer.begin(*lease, mapped) {
+                Ok(()) => Offer::Sealing { since: Instant::now() },
+                Err(mapped) => Offer::Made(mapped),
+            });
+        }
+        while let Some((lease, result)) = self.sealer.result() {
+            self.grant(lease, result, to);
+        }
+    }
+
+    /// Puts this lease into force, if it is still wanted.
+    fn grant(&mut self, lease: u64, sealed: Result<CommanderView, SegmentError>, to: &mut impl Recipient) {
+        let is_it = |stage: &Stage| matches!(stage, Stage::Commanding { lease: held, .. } if *held == lease);
+        let Some(connection) = self.connections.iter_mut().find(|c| is_it(&c.stage)) else { return };
+        let pid = u64::from(connection.peer.pid);
+        let Stage::Commanding { name, offer, .. } = &mut connection.stage else { return };
+        *offer = None;
+        let name = name.clone();
+        let is_granted = match sealed {
+            Ok(view) => to.take(ServerEvent::LeaseGranted { view, pid, name }).is_ok(),
+            Err(error) => {
+                let message = format!("{} ({name}) gets no lease: {error}", ProcessWords(pid));
+                let _ = to.take(ServerEvent::Trouble { message });
+                false
             }
+        };
+        if !is_granted {
+            connection.stage = Stage::Gone;
         }
     }
 

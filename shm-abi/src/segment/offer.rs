@@ -7,7 +7,7 @@
 //! Model: the driver hands the descriptor over, the commander maps it and says so, the driver seals it and touches
 //! every page of its own mapping, and only then the loop gets the [`CommanderView`]. A commander of before 1.3 says
 //! so by its first command, or not at all: some wait for a frame under their lease before they publish, and are
-//! given [`MAPPED_WITHIN`]. All of this happens in the thread of the socket, never in the loop.
+//! given [`MAPPED_WITHIN`]. Sealing waits for whoever writes into the segment: a thread of its own does it (`server/sealer.rs`).
 //!
 //! Invariant: after [`LeaseOffer::seal`] no page of the segment can be taken away or merged into a huge one.
 

@@ -3,7 +3,7 @@
 use super::places::Owner;
 use crate::handshake::Request;
 use crate::peer::{Peer, Process, has_unread};
-use crate::segment::LeaseOffer;
+use crate::segment::{LeaseOffer, TAKEN_WITHIN};
 use bytemuck::Zeroable;
 use rustix::event::{PollFd, PollFlags, Timespec, poll};
 use rustix::io::Errno;
@@ -33,10 +33,29 @@ pub(super) enum Stage {
         name: String,
         process: Process,
         /// The loop knows nothing of the lease as long as there is one.
-        offer: Option<LeaseOffer>,
+        offer: Option<Offer>,
     },
     /// To be forgotten, as soon as it holds nothing of ours.
     Gone,
+}
+
+/// How far a lease is that is not in force yet.
+#[derive(Debug)]
+pub(super) enum Offer {
+    /// Handed over.
+    Made(LeaseOffer),
+    /// Mapped by the commander; being sealed.
+    Sealing { since: Instant },
+}
+
+impl Offer {
+    /// Whether it had time enough.
+    pub(super) fn is_overdue(&self) -> bool {
+        match self {
+            Self::Made(offer) => offer.is_overdue(),
+            Self::Sealing { since } => since.elapsed() > TAKEN_WITHIN,
+        }
+    }
 }
 
 /// What a look at a connection brought.
