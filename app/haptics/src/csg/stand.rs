@@ -226,7 +226,7 @@ fn view_of_patch(
     normal_B: &Vector3<f64>,
     input: &ConeInput,
 ) -> TangentView {
-    if is_turned && patch.holds_in_tip(point_B, &input.hip_B, csg.tight_m()) {
+    if is_turned && patch.holds_in_tip(point_B, &input.hip_B, IN_TIP * csg.extent_m) {
         return all_around(point_B, input);
     }
     let normal_B = if is_turned { -normal_B } else { *normal_B };
@@ -258,6 +258,8 @@ fn view_of_edge(
     TangentView::new(point_B, normal_B, offset_m, input)
 }
 
+/// Nearer to the axis of a cone than this it is in its tip, in terms of the extent: a hundredth of what is told apart.
+const IN_TIP: f64 = 1e-9;
 /// Bound on the flights of a god-object within one tick.
 const MAX_FLIGHTS: u32 = 8;
 /// A HIP this far in front of a patch is free, in terms of the extent: more than a path that ends there is met before it.
