@@ -115,3 +115,40 @@ fn ring_when_pulled(rope: &BellRope, memory: &DriverMemory) {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::cli::told;
+    use bytemuck::Zeroable;
+    use patience::prelude::*;
+    use shm_abi::Frame;
+    use shm_abi::segment::{CommanderMemory, CommanderView, DriverView};
+    use std::os::fd::AsFd;
+    use std::sync::atomic::Ordering;
+
+    #[test]
+    fn a_commander_that_sleeps_is_woken_by_the_thread_that_the_loop_asks() {
+        let memory = Arc::new(told::memory());
+        let bell = BellThread::spawn(Arc::clone(&memory), None, Some(0)).unwrap();
+        let rope = Arc::clone(&bell.rope);
+        drop(bell);
+        let (view, fd) = CommanderView::create(1).unwrap();
+        rope.wakes(view.sleeper());
+        let commander = Arc::new(CommanderMemory::map(fd.as_fd()).unwrap());
+        let driver = DriverView::map(memory.fd()).unwrap();
+        let sleeping = Arc::clone(&commander);
+        let asleep = std::thread::spawn(move || {
+            driver.sleep_for_frame(None, &sleeping, patience::limit() * 2);
+            driver.latest_tick()
+        });
+        patience::until("it sleeps", || commander.bell.owner_sleeps.load(Ordering::Relaxed) != 0);
+        std::thread::sleep(Duration::from_millis(20));
+        memory.write_frame(&Frame { tick: 3, ..Frame::zeroed() });
+        assert!(memory.tell_frame(3, Some(&view)), "it sleeps, and somebody has to wake it");
+        std::thread::sleep(Duration::from_millis(20));
+        assert!(!asleep.is_finished(), "what the loop does itself wakes nobody");
+        rope.pull();
+        assert_eq!(asleep.bounded_join().unwrap(), Some(3));
+    }
+}

@@ -12,7 +12,7 @@ mod places;
 mod prompt;
 mod stopping;
 #[cfg(test)]
-mod told;
+pub(crate) mod told;
 mod zero;
 
 use crate::config::DriverConfig;

@@ -180,7 +180,7 @@ impl Server {
         };
         let (listener, file) = SocketFile::make(path, |path| UnixListener::bind(path), prepare)?;
         let connections = Vec::with_capacity(MAX_CONNECTIONS);
-        let sealer = Sealer::start().map_err(|source| BindError::system("start a thread", path, source))?;
+        let sealer = Sealer::start().map_err(BindError::NoThread)?;
         Ok(Self {
             listener,
             file,

@@ -31,6 +31,9 @@ pub enum BindError {
         /// What the kernel said.
         source: io::Error,
     },
+    /// There can be no thread for what may take long.
+    #[error("cannot start a thread: {0}; raise the limit of processes (`ulimit -u`, TasksMax=)")]
+    NoThread(io::Error),
 }
 
 impl BindError {

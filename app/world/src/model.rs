@@ -171,6 +171,15 @@ pub enum Format {
 }
 
 impl Format {
+    /// Whether these bytes begin with lines of text, which end in line feeds.
+    fn is_lines(self, bytes: &[u8]) -> bool {
+        match self {
+            Self::Obj | Self::Ply => true,
+            Self::Stl => stl::is_text(bytes),
+            Self::Gltf | Self::Ase | Self::ThreeDs => false,
+        }
+    }
+
     /// By the file's ending, in any case; where that says nothing, by its content.
     pub fn of(file: &Path, bytes: &[u8]) -> Option<Self> {
         let ending = file.extension().unwrap_or_default();
@@ -305,7 +314,7 @@ fn format(file: &Path, bytes: &[u8]) -> Result<Format, ModelError> {
         return Err(ModelError::Unreadable(cause));
     }
     let begin = bytes[..bytes.len().min(BEGIN_BYTES)].utf8_chunks().next().map_or("", |chunk| chunk.valid());
-    if let Some(words) = separators::mistaken_ends(begin).filter(|_| format == Format::Obj) {
+    if let Some(words) = separators::mistaken_ends(begin).filter(|_| format.is_lines(bytes)) {
         return Err(ModelError::Unreadable(io::Error::new(io::ErrorKind::InvalidData, words)));
     }
     let looks_like_it = LOOKS.iter().any(|(looks, of)| *of == format && looks(bytes));

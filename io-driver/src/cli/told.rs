@@ -5,7 +5,7 @@ use shm_abi::doorbell::WaitMode;
 use shm_abi::segment::{ClockMode, DriverInfo};
 
 /// Memory of a driver that has told nothing.
-pub(super) fn memory() -> DriverMemory {
+pub(crate) fn memory() -> DriverMemory {
     let info = DriverInfo {
         period_ns: 1_000_000,
         reply_budget_ns: 500_000,

@@ -28,8 +28,10 @@ impl Sealer {
     pub(super) fn start() -> io::Result<Self> {
         let (offers, offered) = sync_channel::<(u64, LeaseOffer)>(0);
         let (tell, results) = sync_channel(MOST_RESULTS);
+        let (tell_begun, begun) = sync_channel::<()>(0);
         let thread = std::thread::Builder::new().name("sealer".into()).stack_size(STACK_BYTES);
         thread.spawn(move || {
+            drop(tell_begun);
             for (lease, offer) in offered {
                 // Nobody who serves is left.
                 if tell.send((lease, offer.seal())).is_err() {
@@ -37,6 +39,8 @@ impl Sealer {
                 }
             }
         })?;
+        // A sandbox that is shut next may know nothing of the calls by which threads begin.
+        let _ = begun.recv();
         Ok(Self { offers, results })
     }
 

@@ -46,6 +46,10 @@ impl Mesh {
             left > 0
         });
         for (face, _) in self.faces.iter().zip(&is_beside).filter(|(_, is_beside)| **is_beside) {
+            // What passes through another part does not lie beside it, and has been told.
+            if face.is_crossed {
+                continue;
+            }
             gaps.faces += 1;
             let [a, b, c] = face.vertices.map(|vertex| self.vertices[vertex as usize]);
             gaps.first_B.get_or_insert(((a + b + c) / 3.0).into());
@@ -55,7 +59,7 @@ impl Mesh {
         for face in self.faces.iter_mut().filter(|face| face.sides == Sides::Solid) {
             face.is_beside = face.vertices.iter().any(|vertex| vertices.contains(vertex));
         }
-        self.has_cracks = gaps.faces > 0;
+        self.has_cracks = is_beside.contains(&true);
         gaps
     }
 }

@@ -175,6 +175,16 @@ fn a_finger_that_begins_inside_beside_a_crack_is_led_to_the_top() {
 }
 
 #[test]
+fn parts_that_pass_through_each_other_do_not_lie_beside_each_other() {
+    let mut soup = make::cuboid([0.1, 0.02, 0.1]);
+    let other = make::cuboid([0.1, 0.02, 0.1]);
+    soup.vertices.extend(other.vertices.iter().map(|v| v + Vector3::new(0.05, 0.005, 0.03)));
+    soup.faces.extend(other.faces.iter().map(|face| face.map(|v| v + 8)));
+    let (_, report) = Mesh::build(soup).unwrap();
+    assert!(report.crossed > 0 && report.narrow_gaps.faces == 0, "{report}");
+}
+
+#[test]
 fn a_gap_that_can_be_felt_is_one_and_parts_far_from_each_other_have_none() {
     for (gap_m, has_gap) in [(1e-5, false), (1e-4, true), (1e-2, true)] {
         let mut soup = make::cuboid([0.1, 0.02, 0.1]);

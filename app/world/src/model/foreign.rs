@@ -29,7 +29,7 @@ fn is_xml_of(text: &[u8], kind: &Kind) -> bool {
 
 const COLLADA: &str = "COLLADA";
 
-const KINDS: [Kind; 8] = [
+const KINDS: [Kind; 10] = [
     Kind {
         name: "3D Studio MAX",
         endings: &["max"],
@@ -41,6 +41,18 @@ const KINDS: [Kind; 8] = [
         endings: &["blend", "blend1"],
         begins: &[b"BLENDER"],
         advice: "open it in Blender and export (File, Export) as glTF 2.0 (.glb), OBJ, PLY or STL",
+    },
+    Kind {
+        name: "3MF",
+        endings: &["3mf"],
+        begins: &[],
+        advice: "open it in a slicer (PrusaSlicer: File, Export, Export plate as STL) and export as STL or OBJ",
+    },
+    Kind {
+        name: "VTK",
+        endings: &["vtk", "vtp", "vtu"],
+        begins: &[b"# vtk DataFile", b"<VTKFile"],
+        advice: "convert it to PLY or OBJ (ParaView: File, Save Data; or `meshio convert`)",
     },
     Kind {
         name: "FBX",

@@ -323,6 +323,10 @@ fn a_file_whose_content_is_not_what_its_name_says_is_told_as_both() {
             "cannot be read: its lines end in carriage returns alone, as of old Macintoshes; save it with the line ends of \
              Unix or Windows",
         ),
+        ("a.stl", b"solid a\rfacet normal 0 0 1\router loop\r", "its lines end in carriage returns alone"),
+        ("a.ply", b"ply\rformat ascii 1.0\r", "its lines end in carriage returns alone"),
+        ("a.3mf", b"PK\x03\x04", "found a file of 3MF, which is not read"),
+        ("a.vtp", b"<VTKFile>", "found a file of VTK, which is not read"),
         ("a.obj", b"\xff\xfev\0 \0", "cannot be read: it is UTF-16 text; save the file as UTF-8"),
     ] {
         let found = model::read(Path::new(name), bytes).expect_err("refused").to_string();
