@@ -21,7 +21,7 @@ pub const ALLOWED_CALLS: &[AllowedCall] = &[
         Any,
         "waking the commander, in lockstep sleeping for its reply; locks, joining the loop's thread",
     ),
-    call("read", libc::SYS_read, Any, "the loop has asked to wake the commander"),
+    call("read", libc::SYS_read, OneOf(2, &[8]), "the loop has asked to wake the commander: eight bytes"),
     call(
         "clock_gettime",
         libc::SYS_clock_gettime,

@@ -43,7 +43,7 @@ fn check_rights(driver: &Driver) {
     // The main thread, which serves, has the program's name.
     let others = threads.iter().filter(|status| status["Pid"] != status["Tgid"]);
     let names: BTreeSet<_> = others.map(|status| status["Name"].as_str()).collect();
-    assert_eq!(names, BTreeSet::from(["driver-loop", "log", "stop", "stops-taken"]));
+    assert_eq!(names, BTreeSet::from(["bell", "driver-loop", "log", "sealer", "stop", "stops-taken"]));
     for status in threads {
         for set in ["CapInh", "CapPrm", "CapEff", "CapAmb"] {
             assert_eq!(status[set], "0000000000000000", "{set} of {}", status["Name"]);
