@@ -35,6 +35,7 @@ mod error;
 mod face;
 mod facing;
 mod fan;
+mod fold;
 mod hole;
 mod junction;
 mod labels;

@@ -32,7 +32,7 @@ impl Mesh {
         if parts.len() < 2 || !self.has_inside {
             return gaps;
         }
-        let mut is_beside = vec![false; self.faces.len()];
+        let (mut is_beside, mut is_told) = (vec![false; self.faces.len()], vec![false; self.faces.len()]);
         let mut left = MOST_PAIRS.saturating_mul(self.faces.len());
         self.bvh.for_each_pair(widest_m, |i, j| {
             let pair = [i, j].map(|face| &self.faces[face as usize]);
@@ -41,15 +41,15 @@ impl Mesh {
             let are_solid = pair.iter().all(|face| face.sides == Sides::Solid);
             if is_other_part && are_solid && do_cross(&corners(), &pair.map(|face| face.normal_B), widest_m) {
                 (is_beside[i as usize], is_beside[j as usize]) = (true, true);
+                // What passes through another part does so at an angle, and has been told.
+                let lies_along = pair[0].normal_B.dot(&pair[1].normal_B).abs() > ALONG;
+                is_told[i as usize] |= lies_along;
+                is_told[j as usize] |= lies_along;
             }
             left -= 1;
             left > 0
         });
-        for (face, _) in self.faces.iter().zip(&is_beside).filter(|(_, is_beside)| **is_beside) {
-            // What passes through another part does not lie beside it, and has been told.
-            if face.is_crossed {
-                continue;
-            }
+        for (face, _) in self.faces.iter().zip(&is_told).filter(|(_, is_told)| **is_told) {
             gaps.faces += 1;
             let [a, b, c] = face.vertices.map(|vertex| self.vertices[vertex as usize]);
             gaps.first_B.get_or_insert(((a + b + c) / 3.0).into());
@@ -64,6 +64,8 @@ impl Mesh {
     }
 }
 
+/// Cosine of the angle up to which faces lie beside each other.
+const ALONG: f64 = 0.9;
 const WIDEST_M: f64 = 1e-5;
 /// Of a mesh that is small itself; of the extent.
 const WIDEST_SHARE: f64 = 2e-4;

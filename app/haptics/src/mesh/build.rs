@@ -4,7 +4,7 @@
 //! order; a walk over the mesh needs none of these.
 //!
 //! Model: validate, repair ([`repair`]), order in space ([`order`]), link ([`topology`]), close cracks ([`junction`]), wind
-//! ([`winding`]), close holes of what is nearly closed ([`hole`]), mark what passes through itself
+//! ([`winding`]), unfold slivers ([`fold`]), close holes of what is nearly closed ([`hole`]), mark what passes through itself
 //! ([`crossed`](super::crossed)), turn closed parts outward ([`nesting`](super::nesting)). What was done is reported; what has no
 //! meaning is refused with the first offender.
 //!
@@ -16,12 +16,15 @@
 use super::order::Triangle;
 use super::repair::area_vector;
 use super::{Bvh, CloseHoles, Face, Link, Mesh, MeshError, MeshReport, Sides, TriangleSoup};
-use super::{hole, junction, order, pinch, repair, topology, winding};
+use super::{fold, hole, junction, order, pinch, repair, topology, winding};
 use nalgebra::Vector3;
 use std::sync::atomic::{AtomicU64, Ordering};
 
 /// A face is divided on one edge at a time.
 const MOST_DIVISIONS: usize = 4;
+
+/// A face is unfolded once at a time, and strips of slivers one by one.
+const MOST_UNFOLDINGS: usize = 8;
 
 /// How many meshes there have been.
 static BUILT: AtomicU64 = AtomicU64::new(0);
@@ -68,6 +71,15 @@ impl Mesh {
             links = link_again(&mut triangles, &mut vertices, &mut report)?;
         }
         let mut parts = winding::orient(&mut triangles, &mut links, &mut report);
+        for _ in 0..MOST_UNFOLDINGS {
+            if !fold::unfold(&mut triangles, &links, &vertices, &mut report.unfolded) {
+                break;
+            }
+            links = link_again(&mut triangles, &mut vertices, &mut report)?;
+            let flipped = std::mem::take(&mut report.flipped);
+            parts = winding::orient(&mut triangles, &mut links, &mut report);
+            report.flipped = flipped;
+        }
         if hole::close(holes, &mut triangles, &links, &mut vertices, &mut report) {
             links = link_again(&mut triangles, &mut vertices, &mut report)?;
             let flipped = std::mem::take(&mut report.flipped);

@@ -109,6 +109,8 @@ pub struct MeshReport {
     pub degenerate: Finding,
     /// Faces divided, because a vertex of other faces lay on their edge.
     pub divided: Finding,
+    /// Slivers that were folded over their neighbour, up to 10 um wide; the edge between the two is another one now.
+    pub unfolded: Finding,
     /// Faces with the same three vertices as an earlier one; left out.
     pub duplicate: Finding,
     /// Faces wound against most of their neighbours; turned over.
@@ -148,6 +150,7 @@ impl MeshReport {
             self.unused_vertices,
             self.degenerate,
             self.divided,
+            self.unfolded,
             self.duplicate,
             self.flipped,
             self.inside_out,
@@ -175,6 +178,7 @@ impl fmt::Display for MeshReport {
             (self.unused_vertices, "vertex", "vertices", "of no face: left out"),
             (self.degenerate, "face", "faces", "without an area: left out"),
             (self.divided, "face", "faces", "with a vertex on an edge: divided"),
+            (self.unfolded, "sliver", "slivers", "folded over its neighbour: unfolded"),
             (self.duplicate, "face", "faces", "given before: left out"),
             (self.flipped, "face", "faces", "wound against the neighbours: turned over"),
             (self.inside_out, "part", "parts", "inside out: turned"),

@@ -24,5 +24,6 @@ mod overlaps;
 mod parts;
 mod plates;
 mod queries;
+mod unfolded;
 mod walk;
 mod wedges;
