@@ -29,7 +29,7 @@ const REST: u32 = 9;
 /// A read, a lock and a wake.
 const STACK_BYTES: usize = 64 * 1024;
 
-/// What the loop pulls.
+/// The loop's end of it.
 #[derive(Debug)]
 pub struct BellRope {
     event: OwnedFd,

@@ -77,7 +77,7 @@ pub struct Cycle {
     rang_ns: u64,
     /// Told of every fault.
     urgent: Urgent,
-    /// Who wakes a commander that sleeps; `None`: the cycle itself, which has no deadlines then.
+    /// Way to wake a commander that sleeps; `None`: the cycle wakes it itself, which has no deadlines then.
     bell: Option<Arc<BellRope>>,
 }
 

@@ -151,7 +151,7 @@ impl Service<'_> {
 /// Passes on to the loop what clients ask for: first that, then the words.
 struct Desk<'a> {
     sender: &'a mut Sender,
-    /// Where to say whom to wake.
+    /// Place to say whom to wake.
     rope: Option<&'a BellRope>,
     memory: &'a DriverMemory,
     options: &'a RunOptions,

@@ -106,7 +106,7 @@ pub(crate) fn refuse_descriptors(socket: &impl AsFd) {
     };
 }
 
-/// Whether something that we sent was not read yet by the other end, which still holds it. Descriptors that were sent count
+/// True while the other end holds something of ours that it has not read. Descriptors that were sent count
 /// against this process until then, though the other end be shut down.
 pub(crate) fn has_unread(connection: BorrowedFd<'_>) -> bool {
     /// Not in libc for every target; include/uapi/linux/sock_diag.h: which of the words counts what was sent.

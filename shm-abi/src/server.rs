@@ -56,7 +56,7 @@ const BACKLOG: i32 = 64;
 const ACCEPT_REST: Duration = Duration::from_millis(100);
 /// How often it is looked whether a commander has mapped its segment.
 const OFFER_LOOK: Duration = Duration::from_millis(1);
-/// How often it is looked whether those who have left still hold what they were handed.
+/// Time between two looks whether those who have left still hold what they were handed.
 const UNREAD_LOOK: Duration = Duration::from_millis(100);
 
 /// What the driver's loop has to know.
@@ -415,7 +415,7 @@ impl Server {
         }
     }
 
-    /// Whether there is a place for one more who is sent descriptors, beside those at this stage.
+    /// True if there is a place for one more who is sent descriptors, beside those at this stage.
     fn has_place_beside(&self, index: usize, counts: impl Fn(&Stage) -> bool) -> bool {
         let others = self.connections.iter().filter(|connection| counts(&connection.stage));
         let is_administrator = self.check(index, Right::Administer).is_ok();

@@ -23,7 +23,7 @@ pub struct Backpressure {
     pub when_full: WhenFull,
     /// For how long without any progress, at most.
     pub patience: Duration,
-    /// Who may want the end.
+    /// Signals that ask for the end.
     pub signals: StopSignals,
 }
 
@@ -33,7 +33,7 @@ impl Backpressure {
         Self { when_full, patience: STUCK, signals: signals.clone() }
     }
 
-    /// How long they wait without any progress, as things are.
+    /// Longest wait without any progress, as things are.
     pub(super) fn patience(&self) -> Duration {
         let most = if self.signals.requested().is_some() { STUCK_AT_THE_END } else { self.patience };
         self.patience.min(most)

@@ -171,7 +171,7 @@ pub enum Format {
 }
 
 impl Format {
-    /// Whether these bytes begin with lines of text, which end in line feeds.
+    /// True of bytes that begin with lines of text, which end in line feeds.
     fn is_lines(self, bytes: &[u8]) -> bool {
         match self {
             Self::Obj | Self::Ply => true,

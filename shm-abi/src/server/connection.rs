@@ -39,7 +39,7 @@ pub(super) enum Stage {
     Gone,
 }
 
-/// How far a lease is that is not in force yet.
+/// Stages of a lease that is not in force yet.
 #[derive(Debug)]
 pub(super) enum Offer {
     /// Handed over.
@@ -49,7 +49,7 @@ pub(super) enum Offer {
 }
 
 impl Offer {
-    /// Whether it had time enough.
+    /// True if it had time enough.
     pub(super) fn is_overdue(&self) -> bool {
         match self {
             Self::Made(offer) => offer.is_overdue(),
@@ -81,7 +81,7 @@ impl Connection {
         matches!(self.stage, Stage::Gone)
     }
 
-    /// Whether descriptors that it was sent lie there unread: they count against the driver, so that it keeps its place.
+    /// True while descriptors that it was sent lie there unread: they count against the driver, so that it keeps its place.
     pub(super) fn holds_descriptors(&self) -> bool {
         self.has_descriptors && has_unread(self.stream.as_fd())
     }

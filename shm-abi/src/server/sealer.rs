@@ -51,7 +51,7 @@ impl Sealer {
         })
     }
 
-    /// What has become of an offer, and of which lease's.
+    /// The result for an offer, and which lease's it was.
     pub(super) fn result(&self) -> Option<(u64, Result<CommanderView, SegmentError>)> {
         self.results.try_recv().ok()
     }

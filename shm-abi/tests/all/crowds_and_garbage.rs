@@ -32,7 +32,7 @@ fn observers_in_any_number_leave_room_for_a_commander_and_a_stop() {
     drop(commander);
 }
 
-/// What lies unread counts against the driver's own limit of descriptors, though whoever asked for it has shut down.
+/// Descriptors that lie unread count against the driver's own limit of descriptors, though whoever asked for it has shut down.
 #[test]
 fn who_leaves_without_taking_what_was_handed_over_keeps_the_place() {
     let mut desk = Desk::open();
@@ -58,7 +58,7 @@ fn who_leaves_without_taking_what_was_handed_over_keeps_the_place() {
     desk.granted(RequestKind::Observe);
 }
 
-/// What lies there for one that has shut down its end.
+/// Answer that lies there for one that has shut down its end.
 fn verdict_after_shutdown(mut stream: &UnixStream) -> Option<Verdict> {
     let mut answer = Answer::zeroed();
     stream.read_exact(bytemuck::bytes_of_mut(&mut answer)).ok()?;

@@ -149,7 +149,7 @@ impl Curved {
         self.turn_LB.try_inverse().map(|turn_BL| turn_BL * tip_L)
     }
 
-    /// Whether a point in the tip of a cone, seen from inside of it, is the nearest of all its side to the HIP.
+    /// True of a point in the tip of a cone, seen from inside of it, that is the nearest of all its side to the HIP.
     pub(super) fn holds_in_tip(&self, point_B: &Vector3<f64>, hip_B: &Vector3<f64>, near_m: f64) -> bool {
         let Kind::Nappe { normal_rho, normal_y, .. } = self.kind else { return false };
         let at_L = self.local(point_B);

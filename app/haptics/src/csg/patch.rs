@@ -132,8 +132,8 @@ impl Patch {
         }
     }
 
-    /// Whether a point in the tip of a cone, seen from inside of it, is the nearest of all its side to the HIP: no normal tells.
-    /// What is nearer to the axis than `near_m` is in the tip.
+    /// True of a point in the tip of a cone, seen from inside of it, that is the nearest of all its side to the HIP: no normal tells.
+    /// Points nearer to the axis than `near_m` are in the tip.
     #[inline(always)]
     pub(super) fn holds_in_tip(&self, point_B: &Vector3<f64>, hip_B: &Vector3<f64>, near_m: f64) -> bool {
         matches!(self, Self::Curved(curved) if curved.holds_in_tip(point_B, hip_B, near_m))

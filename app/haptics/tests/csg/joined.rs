@@ -198,7 +198,7 @@ impl Trial {
         cut.iter().enumerate().any(|(i, a)| cut[..i].iter().any(|b| opposed(a, b)))
     }
 
-    /// Whether there is both material and free space right beside a point. In the tip of a pit few directions are free.
+    /// True where both material and free space are right beside a point. In the tip of a pit few directions are free.
     fn is_on_boundary(&self, god: &Vector3<f64>) -> bool {
         let step_m = 0.1 * RESOLUTION * self.extent_m;
         [64, 20_000].into_iter().any(|count| {

@@ -37,7 +37,7 @@ pub(super) fn looks_like_stl(bytes: &[u8]) -> bool {
     has_the_length_it_says(bytes) || begins_with_solid(bytes)
 }
 
-/// Whether it is of the kind that consists of words.
+/// True of the kind that consists of words.
 pub(super) fn is_text(bytes: &[u8]) -> bool {
     let beginning = &bytes[..bytes.len().min(HEADER_BYTES)];
     begins_with_solid(bytes) && !has_the_length_it_says(bytes) && !beginning.contains(&0)
