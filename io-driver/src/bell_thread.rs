@@ -10,10 +10,10 @@
 //!
 //! Cost: to the loop a system call in ticks in which a commander sleeps.
 
-use rt_core::clock::monotonic_ns;
 use rt_core::privileges::{Keep, reduce_thread};
 use rt_core::setup::promote_beside;
 use rustix::event::{EventfdFlags, eventfd};
+use rustix::time::ClockId;
 use shm_abi::DriverMemory;
 use shm_abi::segment::Sleeper;
 use std::io;
@@ -22,7 +22,7 @@ use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
 
-/// A wake that takes longer walks past more sleepers than there are in earnest.
+/// A wake that takes more of a CPU walks past more sleepers than there are in earnest.
 const LONG_NS: u64 = 200_000;
 /// Rest after one, as a multiple of what it took.
 const REST: u32 = 9;
@@ -103,13 +103,20 @@ impl BellThread {
     }
 }
 
+/// Time of a CPU that this thread has had: one that waits for a CPU walks past nobody.
+fn spent_ns() -> u64 {
+    let now = rustix::time::clock_gettime(ClockId::ThreadCPUTime);
+    let seconds = u64::try_from(now.tv_sec).unwrap_or(0);
+    seconds.saturating_mul(1_000_000_000).saturating_add(u64::try_from(now.tv_nsec).unwrap_or(0))
+}
+
 fn ring_when_pulled(rope: &BellRope, memory: &DriverMemory) {
     while rope.wait().is_ok() {
         let sleeper = rope.sleeper.lock().unwrap_or_else(PoisonError::into_inner).clone();
         let Some(sleeper) = sleeper else { continue };
-        let begun_ns = monotonic_ns();
+        let begun_ns = spent_ns();
         sleeper.wake(memory);
-        let took_ns = monotonic_ns() - begun_ns;
+        let took_ns = spent_ns().saturating_sub(begun_ns);
         if took_ns > LONG_NS {
             std::thread::sleep(Duration::from_nanos(took_ns) * REST);
         }
