@@ -178,7 +178,7 @@ impl fmt::Display for MeshReport {
             (self.unused_vertices, "vertex", "vertices", "of no face: left out"),
             (self.degenerate, "face", "faces", "without an area: left out"),
             (self.divided, "face", "faces", "with a vertex on an edge: divided"),
-            (self.unfolded, "sliver", "slivers", "folded over its neighbour: unfolded"),
+            (self.unfolded, "sliver", "slivers", "folded over a neighbour: unfolded"),
             (self.duplicate, "face", "faces", "given before: left out"),
             (self.flipped, "face", "faces", "wound against the neighbours: turned over"),
             (self.inside_out, "part", "parts", "inside out: turned"),
