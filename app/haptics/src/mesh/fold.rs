@@ -3,8 +3,8 @@
 //! Problem: CAD programs and decimation leave triangles that are lower than a micrometre and turned over, flat upon the face
 //! beside them. Between the two is a slit of no width: a point slides in, and is held there when the hand has long left.
 //!
-//! Model: the edge that such a sliver is folded along, its longest, gives way to the other diagonal of the two faces
-//! (an edge flip). The surface moves by no more than the sliver is high.
+//! Model: the longest edge of such a sliver, whichever edge it is folded along, gives way to the other diagonal of the two faces
+//! beside it (an edge flip). The surface moves by no more than the sliver is high.
 //!
 //! Limits: lower than what no finger feels ([`widest_m`]); folds of wider faces stay, as a model has them.
 //! Cost: linear.
@@ -80,13 +80,16 @@ impl Fold {
         if link.is_boundary() || link.is_turned() || triangles[face].is_lid() {
             return None;
         }
+        let is_over = |link: &Link| {
+            let other = area_vector(&at(triangles[link.face() as usize].corners));
+            area.dot(&other) < FOLDED * area.norm() * other.norm()
+        };
+        let is_folded =
+            links[face].iter().any(|link| !link.is_boundary() && !link.is_turned() && is_over(link));
         let other = link.face() as usize;
         let over = triangles[other].corners;
         let over_area = area_vector(&at(over));
-        if other == face
-            || triangles[other].is_lid()
-            || area.dot(&over_area) > FOLDED * area.norm() * over_area.norm()
-        {
+        if other == face || triangles[other].is_lid() || !is_folded {
             return None;
         }
         let [a, b, p] = [0, 1, 2].map(|i| corners[(longest + i) % 3]);

@@ -3,7 +3,7 @@
 use crate::common::meshes::*;
 use crate::common::*;
 use haptics::Friction;
-use haptics::mesh::{Mesh, MeshReport, TriangleSoup};
+use haptics::mesh::{Mesh, MeshReport, TriangleSoup, make};
 use nalgebra::Vector3;
 use std::sync::Arc;
 
@@ -45,6 +45,38 @@ fn a_sliver_that_is_folded_over_its_neighbour_is_unfolded() {
     for off_m in [2e-5, 1e-3, -5e-7, -1e-3] {
         let (_, report) = folded(off_m, 0.1);
         assert_eq!(report.unfolded.count, 0, "{off_m}: {report}");
+    }
+}
+
+/// Its longest edge is one of the slab's rim, and it is folded over faces beside its others.
+#[test]
+fn a_sliver_at_a_sharp_edge_is_unfolded_into_the_wall() {
+    let mut soup = make::cuboid([0.06, 0.01, 0.06]);
+    // The edge of the top at z = 0.03, and the corner of the top that is not on it.
+    let at = |x: f64, y: f64, z: f64| {
+        let near = |v: &Vector3<f64>| (v - Vector3::new(x, y, z)).norm() < 1e-9;
+        soup.vertices.iter().position(near).unwrap() as u32
+    };
+    let (a, b) = (at(-0.03, 0.005, 0.03), at(0.03, 0.005, 0.03));
+    let is_on_top = |face: &[u32; 3]| face.iter().all(|v| soup.vertices[*v as usize].y > 0.0);
+    let is_there = |face: &[u32; 3]| is_on_top(face) && face.contains(&a) && face.contains(&b);
+    let index = soup.faces.iter().position(is_there).unwrap();
+    let face = soup.faces[index];
+    let first = (0..3).find(|&i| face[i] == a || face[i] == b).unwrap();
+    let turned =
+        if (face[(first + 1) % 3] == a) || (face[(first + 1) % 3] == b) { first } else { (first + 2) % 3 };
+    let [from, to, other] = [0, 1, 2].map(|i| face[(turned + i) % 3]);
+    let p = soup.vertices.len() as u32;
+    // A nanometre beyond the rim.
+    soup.vertices.push(Vector3::new(0.004, 0.005, 0.03 + 1e-9));
+    soup.faces[index] = [from, p, other];
+    soup.faces.extend([[p, to, other], [p, from, to]]);
+    let (mesh, report) = Mesh::build(soup).unwrap();
+    assert_eq!(report.unfolded.count, 1, "{report}");
+    for face in mesh.faces() {
+        let corners = face.vertices.map(|v| mesh.vertices()[v as usize]);
+        let outward = (corners[0] + corners[1] + corners[2]) / 3.0;
+        assert!(face.normal_B.dot(&outward) > 0.0, "{face:?}");
     }
 }
 
