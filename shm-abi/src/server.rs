@@ -8,7 +8,8 @@
 //! [`ServerEvent`]s, for the loop, before whoever asked gets an answer.
 //!
 //! Who got an answer and has nothing to keep is hung up on at once; observers and silent newcomers have bounded places
-//! (`server/places.rs`), and whoever leaves without having read the descriptors that it was sent keeps its place. Newcomers are taken in bounded batches, and a flood of them makes the listener rest.
+//! (`server/places.rs`), and whoever leaves without having read the descriptors that it was sent keeps its place.
+//! Newcomers are taken in bounded batches, and a flood of them makes the listener rest.
 //!
 //! Invariant: nothing a client sends or withholds blocks the thread; a client that connects and says
 //! nothing is dropped after [`PATIENCE`], and one that says more than its request, at once: what nobody
@@ -406,7 +407,8 @@ impl Server {
     }
 
     fn let_observe(&self, index: usize, memory: &DriverMemory) -> Stage {
-        if !self.has_place_beside(index, |stage| matches!(stage, Stage::Observing | Stage::Gone)) {
+        let observes = |connection: &Connection| matches!(connection.stage, Stage::Observing);
+        if !self.has_place_beside(index, |other| observes(other) || other.left_descriptors()) {
             return self.refuse(index, Verdict::Crowded);
         }
         match self.answer(index, &Answer::new(Verdict::Granted), &[memory.fd()]) {
@@ -415,9 +417,9 @@ impl Server {
         }
     }
 
-    /// True if there is a place for one more who is sent descriptors, beside those at this stage.
-    fn has_place_beside(&self, index: usize, counts: impl Fn(&Stage) -> bool) -> bool {
-        let others = self.connections.iter().filter(|connection| counts(&connection.stage));
+    /// True if there is a place for one more who is sent descriptors, beside those that count.
+    fn has_place_beside(&self, index: usize, counts: impl Fn(&Connection) -> bool) -> bool {
+        let others = self.connections.iter().filter(|other| counts(other));
         let is_administrator = self.check(index, Right::Administer).is_ok();
         places::may_observe(self.connections[index].owner(), is_administrator, others.map(Connection::owner))
     }
@@ -434,7 +436,7 @@ impl Server {
             let _ = to.take(ServerEvent::LeaseRefused);
             return self.refuse(index, Verdict::LeaseHeld);
         }
-        if !self.has_place_beside(index, |stage| matches!(stage, Stage::Gone)) {
+        if !self.has_place_beside(index, Connection::left_descriptors) {
             return self.refuse(index, Verdict::Crowded);
         }
         let connection = &self.connections[index];
@@ -566,7 +568,7 @@ impl Server {
     }
 
     fn forget_the_gone(&mut self) {
-        self.connections.retain(|connection| !connection.is_gone() || connection.holds_descriptors());
+        self.connections.retain(|connection| !connection.is_gone() || connection.left_descriptors());
     }
 }
 

@@ -35,7 +35,7 @@ pub(super) fn execute(args: &CheckArgs) -> Option<ExitCode> {
             "patches        {report}\n\
              size           {} x {} x {}\n\
              unit           the file's own; a scene takes it for metres, times the shape's `scale`\n\
-             scene          shape = {{ kind = \"nurbs\", file = \"{file}\" }}\n\
+             scene          shape = {{ kind = \"nurbs\", file = {file:?} }}\n\
              {file}: can be felt\n",
             size.x, size.y, size.z
         );

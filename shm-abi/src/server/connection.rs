@@ -81,9 +81,10 @@ impl Connection {
         matches!(self.stage, Stage::Gone)
     }
 
-    /// True while descriptors that it was sent lie there unread: they count against the driver, so that it keeps its place.
-    pub(super) fn holds_descriptors(&self) -> bool {
-        self.has_descriptors && has_unread(self.stream.as_fd())
+    /// True of one that is gone while descriptors that it was sent lie there unread: they count against the driver, so that it
+    /// keeps its place.
+    pub(super) fn left_descriptors(&self) -> bool {
+        self.is_gone() && self.has_descriptors && has_unread(self.stream.as_fd())
     }
 
     pub(super) fn owner(&self) -> Owner {

@@ -9,7 +9,7 @@ use patience::limit;
 use patience::prelude::*;
 use shm_abi::client::{self, AttachError};
 use shm_abi::handshake::{Answer, Request, RequestKind, Verdict};
-use shm_abi::server::{MAX_ASKING, MAX_OBSERVERS_OF_PROCESS, PATIENCE};
+use shm_abi::server::{BATCH, MAX_ASKING, MAX_OBSERVERS_OF_PROCESS, PATIENCE};
 use std::io::{Read, Write};
 use std::net::Shutdown;
 use std::os::fd::AsFd;
@@ -56,6 +56,21 @@ fn who_leaves_without_taking_what_was_handed_over_keeps_the_place() {
     desk.poll(SHORT);
     desk.poll(SHORT);
     desk.granted(RequestKind::Observe);
+}
+
+#[test]
+fn whoever_was_answered_in_the_same_turn_takes_no_place_of_an_observer() {
+    let mut desk = Desk::open();
+    let ask = |kind| {
+        let mut stream = UnixStream::connect(desk.server.path()).unwrap();
+        stream.write_all(bytemuck::bytes_of(&Request::new(kind, "crowd"))).unwrap();
+        stream
+    };
+    // With the last one as many as are accepted in a turn.
+    let _crowd: Vec<_> = (1..BATCH).map(|_| ask(RequestKind::ClearFault)).collect();
+    let mut observer = ask(RequestKind::Observe);
+    desk.poll(limit());
+    assert_eq!(verdict(&mut observer), Some(Verdict::Granted));
 }
 
 /// Answer that lies there for one that has shut down its end.
