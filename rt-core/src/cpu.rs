@@ -102,6 +102,24 @@ mod tests {
     }
 
     #[test]
+    fn a_thread_that_leaves_a_cpu_keeps_the_others_and_stays_where_there_is_no_other() {
+        let thread = std::thread::spawn(|| {
+            let mine = Pid::from_raw(0);
+            let mut left = affinity(mine).unwrap();
+            while let [first, others @ ..] = &left[..] {
+                leave(*first);
+                let now = affinity(mine).unwrap();
+                assert_eq!(now[..], if others.is_empty() { &left[..] } else { others }[..]);
+                if others.is_empty() {
+                    return;
+                }
+                left = now;
+            }
+        });
+        thread.join().unwrap();
+    }
+
+    #[test]
     fn the_current_cpu_is_one_of_ours() {
         let cpus = online_cpus();
         assert!(cpus.is_sorted() && cpus.contains(&current_cpu()), "{cpus:?}");

@@ -34,8 +34,15 @@ backend = \"simulated\"
 description = \"premium-1.5\"
 ";
 
-/// Answers every frame, spinning, until told to stop.
-fn answer(attachment: &Attachment, stop: &AtomicBool) {
+/// How a commander waits for the next frame.
+#[derive(Clone, Copy)]
+enum Waits {
+    Spinning,
+    Asleep,
+}
+
+/// Answers every frame until told to stop.
+fn answer(attachment: &Attachment, waits: Waits, stop: &AtomicBool) {
     let commander = attachment.commander.as_ref().expect("the lease");
     let mut seen = None;
     while !stop.load(Ordering::Relaxed) {
@@ -44,18 +51,21 @@ fn answer(attachment: &Attachment, stop: &AtomicBool) {
             commander.publish(&Command::zero(tick, commander.lease(), 3), &attachment.driver);
             seen = latest;
         }
-        std::hint::spin_loop();
+        match waits {
+            Waits::Spinning => std::hint::spin_loop(),
+            Waits::Asleep => attachment.driver.sleep_for_frame(seen, commander, Duration::from_millis(5)),
+        }
     }
 }
 
 /// Runs `f` while somebody commands.
-fn with_commander(driver: &Driver, f: impl FnOnce(&DriverView)) {
+fn with_commander(driver: &Driver, waits: Waits, f: impl FnOnce(&DriverView)) {
     let attachment = driver.command();
     let stop = AtomicBool::new(false);
     std::thread::scope(|scope| {
         // If `f` panics the answering must end too, or the scope never would.
         let _stop_at_the_end = Raised(&stop);
-        scope.spawn(|| answer(&attachment, &stop));
+        scope.spawn(|| answer(&attachment, waits, &stop));
         f(&attachment.driver);
     });
 }
@@ -113,9 +123,22 @@ fn in_spin_mode_the_timed_wait_is_the_drivers_only_system_call() {
     let _turn = in_turn();
     let driver = Driver::start(SPINNING);
     let thread = ThreadOf::find(driver.child.id(), "driver-loop");
-    with_commander(&driver, |seen| check_calls("commanded", thread.tid, seen, &["clock_nanosleep"]));
+    with_commander(&driver, Waits::Spinning, |seen| {
+        check_calls("commanded", thread.tid, seen, &["clock_nanosleep"]);
+    });
     let seen = driver.observe().driver;
     check_calls("idle", thread.tid, &seen, &["clock_nanosleep"]);
+}
+
+/// Whoever sleeps or wakes by futex waits for all sleepers in the same bucket of the kernel's table, of whatever process.
+#[test]
+fn the_loop_neither_sleeps_nor_wakes_a_commander_by_futex() {
+    let _turn = in_turn();
+    let driver = Driver::start(&SPINNING.replace("\"spin\"", "\"futex\""));
+    let thread = ThreadOf::find(driver.child.id(), "driver-loop");
+    with_commander(&driver, Waits::Asleep, |seen| {
+        check_calls("before one that sleeps", thread.tid, seen, &["clock_nanosleep", "write"]);
+    });
 }
 
 /// With rights it sleeps until shortly before the frame is due, else on the doorbell; and it wakes the
@@ -141,12 +164,14 @@ fn check_calls(what: &str, tid: u32, seen: &DriverView, allowed: &[&str]) {
         detach_strace(&mut strace);
         Some(calls_in(&trace))
     };
-    in_steady_windows(seen, watch, |calls, is_steady| {
+    in_steady_windows(seen, watch, |calls, _| {
         println!("{what}: system calls in some {WINDOW} ticks: {calls:?}");
         // A tick that is late by most of a period does not sleep; being traced costs 50 us and more each.
         assert!(calls.values().sum::<u64>() > WINDOW / 10, "strace did not watch: {calls:?}");
-        let is_allowed = |name: &str| allowed.contains(&name) || (!is_steady && name == "futex");
-        assert!(calls.keys().all(|name| is_allowed(name)), "{what}: beside {allowed:?}: {calls:?}");
+        assert!(
+            calls.keys().all(|name| allowed.contains(&name.as_str())),
+            "{what}: beside {allowed:?}: {calls:?}"
+        );
     });
 }
 
