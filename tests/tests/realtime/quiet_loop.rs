@@ -221,7 +221,7 @@ fn in_spin_mode_the_driver_sleeps_once_a_tick_and_neither_reads_nor_writes() {
     let _turn = in_turn();
     let driver = Driver::start(SPINNING);
     let thread = ThreadOf::find(driver.child.id(), "driver-loop");
-    with_commander(&driver, |seen| {
+    with_commander(&driver, Waits::Spinning, |seen| {
         let watch = || {
             let (sleeps, io, ticks) = (thread.sleeps(), thread.reads_and_writes(), done(seen));
             wait_for(|| done(seen), WINDOW);
