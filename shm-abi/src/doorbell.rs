@@ -170,6 +170,7 @@ pub fn raise_flag<W: Word>(own_flag: &W, place: u64) {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use std::sync::atomic::AtomicBool;
 
     #[test]
     fn every_way_to_wait_has_its_name() {
@@ -179,16 +180,51 @@ mod tests {
     /// Sleepers compare the word with what they saw: it must differ from one value to the next.
     #[test]
     fn the_word_of_a_bell_is_the_low_half_of_the_number_behind_the_newest() {
-        let bell = Bell {
+        let bell = bell();
+        for (k, word) in [(0, 1), (1, 2), (u64::from(u32::MAX) - 1, u32::MAX), (u64::from(u32::MAX), 0)] {
+            tell(&bell, k);
+            assert_eq!((latest(&bell), bell.doorbell.load(Ordering::Relaxed)), (Some(k), word));
+        }
+    }
+
+    fn bell() -> Bell {
+        Bell {
             latest_plus_one: AtomicU64::new(0),
             doorbell: AtomicU32::new(0),
             padding: AtomicU32::new(0),
             owner_sleeps: AtomicU64::new(0),
             reserved: Default::default(),
-        };
-        for (k, word) in [(0, 1), (1, 2), (u64::from(u32::MAX) - 1, u32::MAX), (u64::from(u32::MAX), 0)] {
-            tell(&bell, k);
-            assert_eq!((latest(&bell), bell.doorbell.load(Ordering::Relaxed)), (Some(k), word));
         }
+    }
+
+    /// A sleeper that has looked, and does not sleep yet, must find another word.
+    #[test]
+    fn the_word_of_a_commander_is_changed_where_it_sleeps_on_it_and_nowhere_else() {
+        for (place, word) in [(0, 0), (SLEEPS_ON_OTHERS_BELL, 0), (SLEEPS_ON_OWN_WORD, 8)] {
+            let (sleeps, own_word) = (AtomicU64::new(place), AtomicU32::new(0));
+            assert_eq!(tell_frame(&bell(), 7, &sleeps, &own_word), place != 0);
+            assert_eq!(own_word.load(Ordering::Relaxed), word, "{place}");
+        }
+    }
+
+    #[test]
+    #[cfg_attr(miri, ignore = "futexes are the system's")]
+    fn where_no_commander_sleeps_nobody_is_woken() {
+        let (bell, own_word) = (bell(), AtomicU32::new(0));
+        let wake = |place| wake_sleeper(&bell, &AtomicU64::new(place), &own_word);
+        let is_over = AtomicBool::new(false);
+        std::thread::scope(|scope| {
+            let _at_the_end = patience::Raised(&is_over);
+            scope.spawn(|| {
+                while !is_over.load(Ordering::Relaxed) {
+                    sleep(Place::bell(&bell), &bell, None, &AtomicU64::new(0), Duration::from_secs(1));
+                }
+            });
+            patience::until("somebody sleeps on the bell", || wake(SLEEPS_ON_OTHERS_BELL) == 1);
+            for _ in 0..50 {
+                std::thread::sleep(Duration::from_millis(1));
+                assert_eq!(wake(0), 0);
+            }
+        });
     }
 }
