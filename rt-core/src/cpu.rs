@@ -90,6 +90,8 @@ pub(crate) fn affinity(thread: Pid) -> Result<Vec<usize>, Errno> {
 
 #[cfg(test)]
 mod tests {
+    use patience::prelude::*;
+
     use super::*;
 
     #[test]
@@ -116,7 +118,7 @@ mod tests {
                 left = now;
             }
         });
-        thread.join().unwrap();
+        thread.bounded_join().unwrap();
     }
 
     #[test]

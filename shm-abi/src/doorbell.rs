@@ -212,11 +212,11 @@ mod tests {
     fn where_no_commander_sleeps_nobody_is_woken() {
         let (bell, own_word) = (bell(), AtomicU32::new(0));
         let wake = |place| wake_sleeper(&bell, &AtomicU64::new(place), &own_word);
-        let is_over = AtomicBool::new(false);
+        let stop = AtomicBool::new(false);
         std::thread::scope(|scope| {
-            let _at_the_end = patience::Raised(&is_over);
+            let _at_the_end = patience::Raised(&stop);
             scope.spawn(|| {
-                while !is_over.load(Ordering::Relaxed) {
+                while !stop.load(Ordering::Relaxed) {
                     sleep(Place::bell(&bell), &bell, None, &AtomicU64::new(0), Duration::from_secs(1));
                 }
             });

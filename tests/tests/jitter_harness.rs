@@ -114,7 +114,8 @@ fn ctrl_c_ends_it_early_with_everything_that_was_measured() {
     let document = result(&place);
     assert_eq!(document.end, "signal 2");
     check_sums(&document);
-    assert!(document.series.iter().flat_map(|series| &series.runs).any(|run| !run.complete));
+    // Between two slices it cuts none.
+    assert!(document.series.iter().all(|series| series.complete_runs().count() < 50));
     assert!(place.path("out/timeline.png").exists());
     assert!(place.processes().is_empty());
 }

@@ -1,6 +1,6 @@
-//! Does memory stay where it is: can it be locked, does a loop fault, is there swap?
+//! Does memory stay where it is: can it be locked, does a loop fault, is there swap, are locked pages moved?
 
-use super::machine::{Machine, Obstacle, one_line};
+use super::machine::{Machine, Obstacle, if_any, one_line};
 use super::step::{Action, Step};
 use super::{Check, Group, Judged, Judgement, Remedy};
 use crate::setup::memory::judge_lock;
@@ -31,6 +31,13 @@ pub const GROUP: Group = Group {
                   left unlocked.",
             run: swap,
         },
+        Check {
+            id: "memory.compaction",
+            title: "compaction",
+            why: "When the kernel makes room for large blocks it may move locked pages, too: whoever uses one meanwhile \
+                  waits until it has been copied, milliseconds at worst.",
+            run: compaction,
+        },
     ],
 };
 
@@ -58,8 +65,8 @@ fn faults(machine: &Machine<'_>) -> Judged {
     Ok(match machine.probes.loop_faults(machine.spec.cpu) {
         Ok(0) => Judgement::pass("none in 50 rounds over 1 MiB"),
         Ok(count) => {
-            let text = "switch off what moves pages: NUMA balancing, KSM, transparent huge pages, memory compaction \
-                        (sysctl vm.compaction_proactiveness=0)";
+            let text =
+                "switch off what moves pages: NUMA balancing, KSM, transparent huge pages, memory compaction";
             Judgement::warn(format!("{count} in 50 rounds over 1 MiB"), Remedy::words(text))
         }
         Err(error) => {
@@ -82,4 +89,21 @@ fn swap(machine: &Machine<'_>) -> Judged {
     let step = Step { what: "no swapping".into(), action: Action::SwapOff };
     let text = "swapoff -a, and take the swap lines out of /etc/fstab (systemd: mask the swap units)";
     Ok(Judgement::warn(one_line(&areas.join(", "), 60), Remedy::steps(text, [step])))
+}
+
+fn compaction(machine: &Machine<'_>) -> Judged {
+    const SWITCH: &str = "/proc/sys/vm/compact_unevictable_allowed";
+    match if_any(machine.number::<u8>(SWITCH))? {
+        None => Ok(Judgement::pass("this kernel has none")),
+        Some(0) => Ok(Judgement::pass("locked pages stay where they are")),
+        Some(1) => {
+            let step =
+                Step::sysctl("leave locked pages where they are", "vm.compact_unevictable_allowed", 0, 1);
+            Ok(Judgement::warn(
+                "locked pages may be moved",
+                Remedy::steps("sysctl vm.compact_unevictable_allowed=0", [step]),
+            ))
+        }
+        Some(other) => Err(Obstacle::garbled(SWITCH, &other.to_string())),
+    }
 }

@@ -572,6 +572,15 @@ fn memory() {
             "=== /proc/swaps\nFilename Type Size Used Priority\n/dev/sda3 partition 1 0 -2\n",
         ),
         ("memory.swap", Unreadable, "makes no sense", "=== /proc/swaps\n/dev/sda3\n"),
+        ("memory.compaction", Pass, "stay where they are", ""),
+        ("memory.compaction", Pass, "has none", "=== /proc/sys/vm/compact_unevictable_allowed removed\n"),
+        ("memory.compaction", Warn, "may be moved", "=== /proc/sys/vm/compact_unevictable_allowed\n1\n"),
+        (
+            "memory.compaction",
+            Unreadable,
+            "makes no sense",
+            "=== /proc/sys/vm/compact_unevictable_allowed\nyes\n",
+        ),
     ]);
 }
 

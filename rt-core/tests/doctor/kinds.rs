@@ -46,6 +46,7 @@ fn a_laptop_as_it_comes_is_told_everything_that_is_in_the_way() {
         ("firmware.latency", Unreadable),
         ("memory.lock", Fail),
         ("memory.swap", Warn),
+        ("memory.compaction", Warn),
     ];
     assert_eq!(complaints_of("debian-laptop", 7), expected);
 }

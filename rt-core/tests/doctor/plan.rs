@@ -372,6 +372,7 @@ fn each_setting_mends_its_own_finding() {
         ("interference.thp", "=== /sys/kernel/mm/transparent_hugepage/enabled\n[always] madvise never\n"),
         ("interference.ksm", "=== /sys/kernel/mm/ksm/run\n1\n"),
         ("interference.numa_balancing", "=== /proc/sys/kernel/numa_balancing\n1\n"),
+        ("memory.compaction", "=== /proc/sys/vm/compact_unevictable_allowed\n1\n"),
         ("interference.workqueues", "=== /sys/devices/virtual/workqueue/cpumask\nf\n"),
         ("interference.default_smp_affinity", "=== /proc/irq/default_smp_affinity\nf\n"),
         (

@@ -55,11 +55,14 @@ sysctl -w kernel.sched_rt_runtime_us=-1
 sysctl -w kernel.watchdog=0
 # kernel.timer_migration: leave timers where they are; undo: sysctl -w kernel.timer_migration=1
 sysctl -w kernel.timer_migration=0
+# vm.compact_unevictable_allowed: leave locked pages where they are; undo: sysctl -w vm.compact_unevictable_allowed=1
+sysctl -w vm.compact_unevictable_allowed=0
 # the same after each boot; undo: rm /etc/sysctl.d/90-phantom3-plan.conf
 add /etc/sysctl.d/90-phantom3-plan.conf <<'END'
 kernel.sched_rt_runtime_us = -1
 kernel.watchdog = 0
 kernel.timer_migration = 0
+vm.compact_unevictable_allowed = 0
 END
 
 # == Settings of the running kernel

@@ -11,6 +11,7 @@ mod changelog;
 mod concurrent;
 mod crowds_and_garbage;
 mod handover;
+mod held_seal;
 mod minor_versions;
 mod other_processes;
 mod refusals;

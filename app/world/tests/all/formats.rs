@@ -410,6 +410,19 @@ fn nodes_of_gltf_put_meshes_where_they_and_their_parents_say() {
 }
 
 #[test]
+fn meshes_of_gltf_that_no_node_shows_are_a_library_and_read_as_they_are() {
+    let mut document = Document::square();
+    let shown = corners(&document.soup());
+    for (nodes, more) in [("", "\"scenes\":[]"), ("", "\"scenes\":[{}]"), ("{}", "\"scene\":0")] {
+        (document.nodes, document.more) = (nodes.into(), more.into());
+        assert_eq!(corners(&document.soup()), shown, "{nodes} {more}");
+    }
+    // A scene in which nothing is shown, of meshes that others show.
+    (document.nodes, document.more) = ("{\"mesh\":0}".into(), "\"scenes\":[{}]".into());
+    refused(document.read(), "found no triangle in it; allowed: at least one");
+}
+
+#[test]
 fn triangles_strips_and_fans_of_gltf_are_read_and_points_and_lines_are_not() {
     let faces = |mode: u32, indices: &[u8]| {
         let mut document = Document::square();

@@ -26,10 +26,13 @@ fn keeps_free(machine: &Machine<'_>, cpu: usize) -> bool {
 fn is_set_by_unit(action: &Action) -> bool {
     match action {
         Action::Put { path, .. } => SET_BY_UNIT.iter().any(|part| path.contains(part)),
-        Action::Sysctl { key, .. } => ["kernel.numa_balancing", "kernel.nmi_watchdog"].contains(key),
+        Action::Sysctl { key, .. } => SYSCTL_OF_UNIT.contains(key),
         _ => false,
     }
 }
+
+const SYSCTL_OF_UNIT: [&str; 3] =
+    ["kernel.numa_balancing", "kernel.nmi_watchdog", "vm.compact_unevictable_allowed"];
 
 const SET_BY_UNIT: [&str; 7] = [
     "/sched/fair_server/",
