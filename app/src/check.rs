@@ -6,6 +6,7 @@
 //! meant, is a *warning*.
 
 mod common_places;
+mod contacts;
 mod measures;
 pub(crate) mod model_file;
 mod patch_file;

@@ -102,8 +102,8 @@ pub enum RunFailure {
     OtherDriver(String),
     /// Somebody ended the lease of a run whose driver goes on.
     #[error(
-        "somebody ended this run's lease (`io-driver end-lease`), and its force with it; the driver goes on for whoever \
-         commands next"
+        "this run's lease has ended, and its force with it; the driver goes on for whoever commands next: somebody ended it \
+         (`io-driver end-lease`), or the driver could not put it in force, which it says in its log"
     )]
     LeaseEnded,
     /// The driver publishes no frames any more.

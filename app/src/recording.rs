@@ -165,6 +165,11 @@ impl Recording {
         self.lines.is_as_before()
     }
 
+    /// Rows in the file.
+    pub fn rows(&self) -> u64 {
+        self.lines.rows()
+    }
+
     /// Where it lies.
     pub fn path(&self) -> &Path {
         &self.path

@@ -25,6 +25,7 @@ use shm_abi::handshake::Verdict;
 use shm_abi::peer::ProcessWords;
 use shm_abi::server::{Recipient, Server, ServerEvent};
 use shm_abi::socket_file::SocketFile;
+use shm_abi::users::UserWords;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::Path;
 use std::sync::Arc;
@@ -182,21 +183,28 @@ impl Recipient for Desk<'_> {
             {
                 return Err(Verdict::Outdated);
             }
-            ServerEvent::ClearFaultRequested { uid, is_administrator, asked_ns } => {
-                let is_own = |by| by == StoppedBy::Nobody || by == StoppedBy::User(uid);
+            ServerEvent::ClearFaultRequested { user, is_administrator, asked_ns } => {
+                let is_own =
+                    |by| by == StoppedBy::Nobody || user.is_some_and(|uid| by == StoppedBy::User(uid));
                 let cleared = self.sender.urgent.clear_fault(asked_ns, |by| is_administrator || is_own(by));
                 cleared.map_err(|why| match why {
                     NotCleared::Outdated => Verdict::Outdated,
                     NotCleared::NotAllowed => Verdict::NotAllowed,
                 })?;
             }
-            ServerEvent::EmergencyStopRequested { pid, uid, .. } => {
+            ServerEvent::EmergencyStopRequested { pid, user, .. } => {
                 // As of now: who asked before to leave a fault did not know of it, whatever the clock of who stops says.
-                self.sender.urgent.stop(Some(uid), monotonic_ns());
-                say(
-                    self.options,
-                    format_args!("emergency stop, asked for by {} of user {uid}", ProcessWords(pid)),
-                );
+                // Whoever asks a thousand times fills no log.
+                if self.sender.urgent.stop(user, monotonic_ns()) {
+                    say(
+                        self.options,
+                        format_args!(
+                            "emergency stop, asked for by {} of {}",
+                            ProcessWords(pid),
+                            UserWords(user)
+                        ),
+                    );
+                }
             }
             ServerEvent::ZeroRequested { pid, devices, .. } => {
                 self.post(Letter::Zero(DeviceSet(devices)))?;

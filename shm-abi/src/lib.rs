@@ -53,6 +53,7 @@ pub mod seqlock;
 pub mod server;
 pub mod socket_file;
 pub mod stop_socket;
+pub mod users;
 
 mod enumeration;
 mod socket;

@@ -5,6 +5,7 @@
 //! the same number.
 //! Invariant: nothing here waits for the other end.
 
+use crate::users::known_user;
 use nix::libc;
 use nix::sys::socket::{getsockopt, sockopt};
 use rustix::process::{Pid, PidfdFlags, pidfd_open};
@@ -32,6 +33,11 @@ impl Peer {
         let credentials = getsockopt(&connection, sockopt::PeerCredentials)?;
         let (uid, gid) = (credentials.uid(), credentials.gid());
         Ok(Self { pid: credentials.pid().cast_unsigned(), uid, gid })
+    }
+
+    /// Its user, if that can be told from others.
+    pub fn user(&self) -> Option<u32> {
+        known_user(self.uid)
     }
 
     /// All groups of the client's user when it made this connection.

@@ -49,17 +49,17 @@ impl Rights {
         Self { owner, look: None, command: None, administer: None }
     }
 
-    /// Checks that a user in these groups has a right.
+    /// Checks that a user in these groups has a right; of one who cannot be told from others only the groups count.
     ///
     /// # Errors
     /// The group that has it, if it is anybody's but root's and the owner's.
     pub fn check(
         &self,
         right: Right,
-        uid: u32,
+        user: Option<u32>,
         groups: impl FnOnce() -> Vec<u32>,
     ) -> Result<(), Option<u32>> {
-        if uid == 0 || uid == self.owner {
+        if user.is_some_and(|uid| uid == 0 || uid == self.owner) {
             return Ok(());
         }
         let needed = match right {
@@ -83,11 +83,12 @@ impl Rights {
     /// As of [`check`](Self::check), for [`Right::Administer`].
     pub fn check_end_of_lease(
         &self,
-        holder: u32,
-        uid: u32,
+        holder: Option<u32>,
+        user: Option<u32>,
         groups: impl FnOnce() -> Vec<u32>,
     ) -> Result<(), Option<u32>> {
-        if uid == holder { Ok(()) } else { self.check(Right::Administer, uid, groups) }
+        let is_own = user.is_some() && user == holder;
+        if is_own { Ok(()) } else { self.check(Right::Administer, user, groups) }
     }
 }
 
@@ -105,7 +106,7 @@ mod tests {
     /// What somebody in these groups may do.
     fn allowed(rights: Rights, uid: u32, groups: &[u32]) -> [Result<(), Option<u32>>; 3] {
         [Right::Look, Right::Command, Right::Administer]
-            .map(|right| rights.check(right, uid, || groups.to_vec()))
+            .map(|right| rights.check(right, Some(uid), || groups.to_vec()))
     }
 
     #[test]
@@ -135,11 +136,24 @@ mod tests {
     #[test]
     fn a_lease_is_ended_by_its_holders_user_and_by_administrators() {
         let rights = rights(None, None, Some(30));
-        let may = |uid, groups: &[u32]| rights.check_end_of_lease(ANN, uid, || groups.to_vec());
+        let may = |uid, groups: &[u32]| rights.check_end_of_lease(Some(ANN), Some(uid), || groups.to_vec());
         assert_eq!(may(ANN, &[]), Ok(()));
         assert_eq!([0, OWNER].map(|uid| may(uid, &[])), [Ok(()); 2]);
         assert_eq!(may(ANN + 1, &[]), Err(Some(30)));
         assert_eq!(may(ANN + 1, &[30]), Ok(()));
+    }
+
+    /// Two of them are not the same, and the driver's own user is none of them.
+    #[test]
+    fn whoever_cannot_be_told_from_others_owns_nothing_and_has_the_rights_of_the_groups() {
+        let rights = Rights { owner: 65_534, ..rights(None, None, Some(30)) };
+        let may = |holder, groups: &[u32]| rights.check_end_of_lease(holder, None, || groups.to_vec());
+        for holder in [None, Some(65_534), Some(ANN)] {
+            assert_eq!(may(holder, &[]), Err(Some(30)), "{holder:?}");
+            assert_eq!(may(holder, &[30]), Ok(()), "{holder:?}");
+        }
+        assert_eq!(rights.check(Right::Administer, None, Vec::new), Err(Some(30)));
+        assert_eq!(rights.check(Right::Command, None, Vec::new), Ok(()));
     }
 
     #[test]

@@ -25,8 +25,8 @@ use crate::handshake::{self, Answer, Request, RequestKind, Verdict};
 use crate::peer::{Peer, Process, ProcessWords, refuse_descriptors};
 use crate::rights::{Right, Rights};
 use crate::segment::{CommanderView, DriverMemory, LeaseOffer, SegmentError};
-use crate::socket;
 use crate::socket_file::{Lock, SocketFile, make_sure_nobody_listens, without_end};
+use crate::{socket, users};
 use connection::{Connection, Heard, Offer, Stage, timespec};
 use rustix::event::{PollFd, PollFlags, poll};
 use rustix::io::Errno;
@@ -41,7 +41,7 @@ use std::time::{Duration, Instant};
 
 pub use crate::socket_file::BindError;
 pub use places::{
-    FOR_ADMINISTRATORS, MAX_ASKING, MAX_CONNECTIONS, MAX_OBSERVERS, MAX_OBSERVERS_OF_PROCESS,
+    FOR_ADMINISTRATORS, FOR_COMMANDERS, MAX_ASKING, MAX_CONNECTIONS, MAX_OBSERVERS, MAX_OBSERVERS_OF_PROCESS,
     MAX_OBSERVERS_OF_USER,
 };
 
@@ -86,8 +86,8 @@ pub enum ServerEvent {
     },
     /// Somebody asks the driver to leave its fault state.
     ClearFaultRequested {
-        /// Whose process it is.
-        uid: u32,
+        /// Whose process it is, if that is known.
+        user: Option<u32>,
         /// Whether he may undo what others did.
         is_administrator: bool,
         /// When it was asked, by CLOCK_MONOTONIC (ns); no later than it was.
@@ -97,8 +97,8 @@ pub enum ServerEvent {
     EmergencyStopRequested {
         /// Who.
         pid: u64,
-        /// Whose process it is.
-        uid: u32,
+        /// Whose process it is, if that is known.
+        user: Option<u32>,
         /// When it was asked, by CLOCK_MONOTONIC (ns); no later than it was.
         asked_ns: u64,
     },
@@ -164,6 +164,7 @@ impl Server {
     /// # Errors
     /// As [`bind`](Self::bind).
     pub fn bind_for(path: &Path, rights: Rights) -> Result<Self, BindError> {
+        users::look();
         let path = without_end(path);
         if let Some(directory) = path.parent().filter(|directory| !directory.as_os_str().is_empty()) {
             std::fs::DirBuilder::new()
@@ -216,7 +217,7 @@ impl Server {
             self.listen_to(index, memory, to);
         }
         self.grant_what_is_mapped(to);
-        self.drop_the_silent();
+        self.drop_the_silent(to);
         self.forget_the_gone();
         if newcomer {
             self.accept_batch(memory, to);
@@ -349,8 +350,8 @@ impl Server {
         if let Err(group) = self.check(index, Right::for_request(kind)) {
             return self.deny(index, group);
         }
-        let Peer { pid, uid, .. } = self.connections[index].peer;
-        let pid = u64::from(pid);
+        let peer = &self.connections[index].peer;
+        let (pid, user) = (u64::from(peer.pid), peer.user());
         let asked_ns = self.asked_ns(request, kind);
         match kind {
             RequestKind::Observe => self.let_observe(index, memory),
@@ -359,10 +360,10 @@ impl Server {
             RequestKind::Stop => self.pass_on(index, ServerEvent::StopRequested { pid }, to),
             RequestKind::ClearFault => {
                 let is_administrator = self.check(index, Right::Administer).is_ok();
-                self.pass_on(index, ServerEvent::ClearFaultRequested { uid, is_administrator, asked_ns }, to)
+                self.pass_on(index, ServerEvent::ClearFaultRequested { user, is_administrator, asked_ns }, to)
             }
             RequestKind::EmergencyStop => {
-                self.pass_on(index, ServerEvent::EmergencyStopRequested { pid, uid, asked_ns }, to)
+                self.pass_on(index, ServerEvent::EmergencyStopRequested { pid, user, asked_ns }, to)
             }
             RequestKind::Zero => self.pass_on(
                 index,
@@ -403,25 +404,21 @@ impl Server {
     /// The group that has it, if there is one, if this client has it not.
     fn check(&self, index: usize, right: Right) -> Result<(), Option<u32>> {
         let connection = &self.connections[index];
-        self.rights.check(right, connection.peer.uid, || connection.groups())
+        self.rights.check(right, connection.peer.user(), || connection.groups())
     }
 
     fn let_observe(&self, index: usize, memory: &DriverMemory) -> Stage {
         let observes = |connection: &Connection| matches!(connection.stage, Stage::Observing);
-        if !self.has_place_beside(index, |other| observes(other) || other.left_descriptors()) {
+        let others = self.connections.iter().filter(|other| observes(other) || other.left_descriptors());
+        let is_administrator = self.check(index, Right::Administer).is_ok();
+        let newcomer = self.connections[index].owner();
+        if !places::may_observe(newcomer, is_administrator, others.map(Connection::owner)) {
             return self.refuse(index, Verdict::Crowded);
         }
         match self.answer(index, &Answer::new(Verdict::Granted), &[memory.fd()]) {
             Ok(()) => Stage::Observing,
             Err(_) => Stage::Gone,
         }
-    }
-
-    /// True if there is a place for one more who is sent descriptors, beside those that count.
-    fn has_place_beside(&self, index: usize, counts: impl Fn(&Connection) -> bool) -> bool {
-        let others = self.connections.iter().filter(|other| counts(other));
-        let is_administrator = self.check(index, Right::Administer).is_ok();
-        places::may_observe(self.connections[index].owner(), is_administrator, others.map(Connection::owner))
     }
 
     fn lease_to(
@@ -436,7 +433,8 @@ impl Server {
             let _ = to.take(ServerEvent::LeaseRefused);
             return self.refuse(index, Verdict::LeaseHeld);
         }
-        if !self.has_place_beside(index, Connection::left_descriptors) {
+        let left = self.connections.iter().filter(|other| other.left_descriptors());
+        if !places::may_command(self.connections[index].owner(), left.map(Connection::owner)) {
             return self.refuse(index, Verdict::Crowded);
         }
         let connection = &self.connections[index];
@@ -507,7 +505,8 @@ impl Server {
     fn end_lease(&mut self, index: usize, to: &mut impl Recipient) -> Stage {
         if let Some((holder, connection)) = self.holder() {
             let asker = &self.connections[index];
-            let may = self.rights.check_end_of_lease(connection.peer.uid, asker.peer.uid, || asker.groups());
+            let may =
+                self.rights.check_end_of_lease(connection.peer.user(), asker.peer.user(), || asker.groups());
             match may {
                 Err(group) => return self.deny(index, group),
                 Ok(()) => self.hang_up(holder, to),
@@ -553,12 +552,17 @@ impl Server {
         all.find(|(_, connection)| matches!(connection.stage, Stage::Commanding { .. }))
     }
 
-    fn drop_the_silent(&mut self) {
+    fn drop_the_silent(&mut self, to: &mut impl Recipient) {
         for connection in &mut self.connections {
             let is_silent = match &connection.stage {
                 Stage::Asking { since, .. } => since.elapsed() > PATIENCE,
                 // The loop knows nothing of this lease yet.
-                Stage::Commanding { offer: Some(offer), .. } => offer.is_overdue(),
+                Stage::Commanding { offer: Some(offer), name, .. } if offer.is_overdue() => {
+                    let (process, why) = (ProcessWords(connection.peer.pid.into()), offer.why_overdue());
+                    let message = format!("{process} ({name}) gets no lease: {why}");
+                    let _ = to.take(ServerEvent::Trouble { message });
+                    true
+                }
                 _ => false,
             };
             if is_silent {

@@ -8,8 +8,9 @@
 //! before Linux 6.16 descriptors that come with it take as long to close as their sender likes (a TCP connection that
 //! lingers). It needs neither memory nor descriptors for it.
 
-use crate::peer;
 use crate::socket_file::{self, BindError, SocketFile};
+use crate::users::known_user;
+use crate::{peer, users};
 use nix::cmsg_space;
 use nix::libc::ucred;
 use nix::sys::socket::{ControlMessageOwned, MsgFlags, recvmsg};
@@ -56,6 +57,7 @@ impl StopSocket {
     /// # Errors
     /// What the file system says.
     pub fn bind(socket: &Path) -> Result<(Self, SocketFile), BindError> {
+        users::look();
         let tell_sender = |socket: &UnixDatagram| {
             peer::refuse_descriptors(socket);
             Ok(rustix::net::sockopt::set_socket_passcred(socket, true)?)
@@ -84,7 +86,7 @@ impl StopSocket {
         let fd = self.socket.as_raw_fd();
         let received = recvmsg::<()>(fd, &mut parts, Some(&mut self.control), MsgFlags::MSG_PEEK)?;
         let sender = received.cmsgs().into_iter().flatten().find_map(|message| match message {
-            ControlMessageOwned::ScmCredentials(credentials) => Some(credentials.uid()),
+            ControlMessageOwned::ScmCredentials(credentials) => known_user(credentials.uid()),
             _ => None,
         });
         Ok(sender)

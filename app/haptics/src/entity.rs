@@ -56,6 +56,8 @@ pub struct Entity {
     /// How much of an approaching velocity it gives back to what bounces off it, 0 to 1; no finger feels it. `None`: nobody
     /// says.
     pub restitution: Option<f64>,
+    /// Of each point where another entity touches it \[N/m\], > 0; no finger feels it. `None`: nobody says.
+    pub contact_stiffness_n_per_m: Option<f64>,
     /// How contacts with it are rendered.
     pub algorithm: Algorithm,
     /// Whether its facets feel smooth.
@@ -95,6 +97,7 @@ impl Entity {
             friction: Friction::None,
             face_materials: None,
             restitution: None,
+            contact_stiffness_n_per_m: None,
             algorithm: Algorithm::FrictionCone,
             shading: Shading::None,
             height_map: None,
@@ -121,6 +124,12 @@ impl Entity {
     /// With this share of an approaching velocity given back. Errors: a share below 0 or above 1.
     pub fn with_restitution(self, restitution: f64) -> Result<Self, ParameterError> {
         Ok(Self { restitution: Some(share("restitution", restitution)?), ..self })
+    }
+
+    /// With this stiffness towards other entities. Errors: a stiffness that is not finite or not positive.
+    pub fn with_contact_stiffness(self, stiffness_n_per_m: f64) -> Result<Self, ParameterError> {
+        let stiffness_n_per_m = above_zero("contact_stiffness_n_per_m", stiffness_n_per_m)?;
+        Ok(Self { contact_stiffness_n_per_m: Some(stiffness_n_per_m), ..self })
     }
 
     /// Rendered by this algorithm.

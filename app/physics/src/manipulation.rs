@@ -29,12 +29,12 @@ use crate::anchor::Anchor;
 use crate::body::Body;
 use crate::broad_phase::BroadPhase;
 use crate::collide::{self, MAX_POINTS, can_move};
+use crate::contacts::Contacts;
 use crate::error::BodyError;
 use crate::hand::{FingerSettings, FingerTick, Hand};
 use crate::integrator::Gets;
 use crate::integrator::explicit::Kept;
 use crate::integrator::rk4::Stages;
-use crate::pair::Response;
 use crate::pairs::{Pairs, Who};
 use crate::pull::{MAX_PULLS, Pull};
 use crate::restitution::Restitution;
@@ -49,6 +49,7 @@ use crate::touch::Touch;
 #[derive(Debug)]
 pub struct Manipulation {
     settings: Settings,
+    contacts: Contacts,
     roster: Roster,
     broad_phase: BroadPhase,
     pairs: Pairs,
@@ -127,8 +128,10 @@ impl Manipulation {
         let pairs = count.saturating_mul(entities.len()).min(MAX_PAIRS.max(PAIRS_OF_BODY * count));
         let rows = MAX_ROWS.max(ROWS_OF_BODY * count);
         let room = (pairs * MAX_POINTS).min(rows) + MAX_TOUCHES + MAX_PULLS;
+        let heaviest_kg = bodies.iter().map(|(_, body)| body.mass.mass_kg).fold(0.0, f64::max);
         let mut made = Self {
             settings,
+            contacts: settings.contacts(heaviest_kg),
             roster: Roster::new(entities.len(), bodies),
             broad_phase: BroadPhase::new(entities),
             pairs: Pairs::with_capacity(pairs),
@@ -160,7 +163,7 @@ impl Manipulation {
             has_changed: vec![false; count].into(),
         };
         for body in 0..count {
-            let who = who(&made.roster, entities, settings.response);
+            let who = who(&made.roster, entities, made.contacts);
             made.pairs.meet(body, &who, &made.broad_phase, true);
         }
         made
@@ -257,8 +260,8 @@ impl Manipulation {
     }
 }
 
-fn who<'w>(roster: &'w Roster, all: &'w [Entity], response: Response) -> Who<'w> {
-    Who { all, entities: &roster.entities, bodies: &roster.numbers, response }
+fn who<'w>(roster: &'w Roster, all: &'w [Entity], contacts: Contacts) -> Who<'w> {
+    Who { all, entities: &roster.entities, bodies: &roster.numbers, contacts }
 }
 
 fn moving(body: &Body) -> Motion {

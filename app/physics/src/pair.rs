@@ -18,13 +18,14 @@ use crate::collide::{
     ContactPoint, ContactPoints, MAX_POINTS, PairMemory, Solid, bounding_ball, contact_points,
 };
 use crate::pairs::Who;
-use crate::restitution::Meeting;
+use crate::restitution::{Meeting, Stop, velocity};
 use crate::row::Row;
 use crate::solver::Motion;
 pub(crate) use crossing::{ANCHORS_AT_ONCE, Head};
 use ledger::{Allowed, Ledger, MAX_SPRINGS, Stretched};
 pub(crate) use pressed::HARD;
-use pressed::{let_out_m_s, row};
+pub(crate) use pressed::let_out_m_s;
+use pressed::row;
 pub use surfacing::{Response, Surfacing};
 
 /// A pair and its contact points.
@@ -109,7 +110,7 @@ impl Pair {
     /// Looks again what the two surfaces are.
     pub(crate) fn resurface(&mut self, who: &Who<'_>) {
         let [a, b] = self.entities;
-        self.surfacing = Surfacing::between(&who.all[a], &who.all[b], who.response);
+        self.surfacing = Surfacing::between(&who.all[a], &who.all[b], &who.contacts);
     }
 
     /// The force on A in the last tick \[N\], over all points.
@@ -147,10 +148,11 @@ impl Pair {
             if rows.len() == rows.capacity() {
                 break;
             }
-            let row = row(self.bodies, &self.surfacing, anchor, point, &b.X_WB, start);
-            if let Response::Impulse { restitution } = self.surfacing.response {
-                let gap_m = -anchor.pressed_m;
-                meetings.push(Meeting::of((rows.len(), &row), gap_m, restitution, anchor, start));
+            let (row, stop_n_s_per_m) = row(self.bodies, &self.surfacing, anchor, point, &b.X_WB, start);
+            let response = self.surfacing.response;
+            if let Some(restitution) = response.restitution() {
+                let stop = Stop { n_s_per_m: stop_n_s_per_m, is_always: !response.has_springs() };
+                meetings.push(Meeting::of((rows.len(), &row), stop, restitution, anchor, start));
             }
             rows.push(row);
             self.rows += 1;
@@ -161,7 +163,7 @@ impl Pair {
     /// How far each point's springs are stretched: as far as it is deep and was dragged, if that was worked for.
     fn press(&mut self, points: &[ContactPoint], begins: bool, start: &Start<'_>) {
         let k = self.surfacing.stiffness_n_per_m;
-        let has_springs = self.surfacing.response == Response::Force;
+        let has_springs = self.surfacing.response.has_springs();
         let mut springs = [Stretched::default(); MAX_SPRINGS];
         let (mut full, mut is_let_out) = (0.0, false);
         for (at, (anchor, point)) in self.anchors.iter_mut().zip(points).enumerate() {
@@ -233,6 +235,33 @@ impl Pair {
         self.ledger.pay(owed_j)
     }
 
+    /// What of a row's force is a spring's: along the normal impulses are no springs', and those of an impact not across it either.
+    fn of_spring_W(&self, row: &Row) -> Vector3<f64> {
+        let is_spring = row.stiffness[1] == self.surfacing.stiffness_n_per_m;
+        match (is_spring, self.surfacing.response.has_springs()) {
+            (true, true) => row.force_W,
+            (true, false) => row.force_W - row.normal_W * row.normal_W.dot(&row.force_W),
+            (false, _) => Vector3::zeros(),
+        }
+    }
+
+    /// Takes what its impulses put in from what the tick took from the bodies (J): that the tick has not taken. For all pairs,
+    /// before any of them [settles](Self::settle).
+    pub(crate) fn take_impulses(&self, end: &End<'_>, spare_j: &mut [f64]) {
+        if self.surfacing.response.restitution().is_none() {
+            return;
+        }
+        for row in self.rows(end.rows) {
+            let put_in_j = (row.force_W - self.of_spring_W(row)).dot(&velocity(row, end.motions)) * end.dt_s;
+            let mut left_j = put_in_j.max(0.0);
+            for body in [Some(row.body), row.other].into_iter().flatten() {
+                let part_j = left_j.min(spare_j[body].max(0.0));
+                spare_j[body] -= part_j;
+                left_j -= part_j;
+            }
+        }
+    }
+
     /// Takes note of how the tick ended, and of which rows met in it after it had begun. `spare_j`: of each body what the tick itself
     /// took from it (J), negative: what it owes; a pair that can use it takes it.
     pub(crate) fn settle(&mut self, end: &End<'_>, has_met: impl Fn(usize) -> bool, spare_j: &mut [f64]) {
@@ -241,34 +270,23 @@ impl Pair {
         }
         let X_WB = &end.entities[self.entities[1]].X_WB;
         let own = end.rows.iter().enumerate().skip(self.first_row).take(self.rows);
-        let mut presses = false;
+        let (mut presses, mut worked_j) = (false, 0.0);
+        let stiffness_n_per_m = self.surfacing.stiffness_n_per_m;
         for (anchor, (at, row)) in self.anchors.iter_mut().zip(own) {
             anchor.approached |= has_met(at);
-            let mut velocity_W = end.motions[row.body].at(&row.arms_W[0]);
-            if let Some(other) = row.other {
-                velocity_W -= end.motions[other].at(&row.arms_W[1]);
-            }
-            let is_spring = row.stiffness[1] == self.surfacing.stiffness_n_per_m;
-            if !is_spring {
+            let velocity_W = velocity(row, end.motions);
+            if row.stiffness[1] != stiffness_n_per_m {
                 // An impact lets go of what friction had stretched.
                 anchor.release();
             }
             anchor.settle(row, &(velocity_W * end.dt_s), X_WB);
-            let force_W = match self.surfacing.response {
-                Response::Force => row.force_W,
-                // Along the normal impulses are no springs', and those of an impact not across it either.
-                Response::Impulse { .. } if is_spring => {
-                    row.force_W - row.normal_W * row.normal_W.dot(&row.force_W)
-                }
-                Response::Impulse { .. } => Vector3::zeros(),
-            };
-            presses |= force_W != Vector3::zeros();
-            self.ledger.enter(force_W.dot(&velocity_W) * end.dt_s);
-            // What impulses put in the tick has not taken.
-            let put_in_j = (row.force_W - force_W).dot(&velocity_W) * end.dt_s;
-            let spare_j = &mut spare_j[row.body];
-            *spare_j = spare_j.min((*spare_j - put_in_j.max(0.0)).max(0.0));
         }
+        for row in self.rows(end.rows) {
+            let force_W = self.of_spring_W(row);
+            presses |= force_W != Vector3::zeros();
+            worked_j += force_W.dot(&velocity(row, end.motions)) * end.dt_s;
+        }
+        self.ledger.enter(worked_j);
         let moves = |body: &usize| end.motions[*body].is_movable();
         let bodies = || [Some(self.bodies.0), self.bodies.1].into_iter().flatten().filter(moves);
         if presses && self.ledger.owes() {
@@ -321,7 +339,10 @@ impl Pair {
                 continue;
             }
             self.anchors[at] = Anchor::begin(point, now[0], now[1]);
-            if begins && self.ledger.is_closed() && -point.gap_m > reach_m {
+            if begins
+                && self.ledger.is_closed()
+                && -point.gap_m > reach_m.min(self.surfacing.deepest_rest_m())
+            {
                 self.anchors[at].granted_m = point.depth_m();
             }
         }

@@ -14,15 +14,19 @@ use haptics::Entity;
 use crate::pair::Response;
 
 impl Response {
-    /// What it is between two entities: `self`'s restitution is that of pairs of which neither says one.
+    /// What it is between two entities: `self`'s restitution is that of pairs of which neither says one. What is pressed by
+    /// a spring alone bounces if either says so.
     #[must_use]
     pub fn between(self, a: &Entity, b: &Entity) -> Self {
-        let Self::Impulse { restitution } = self else { return self };
-        let restitution = match (a.restitution, b.restitution) {
-            (Some(e_a), Some(e_b)) => composite([e_a, e_b], [a.stiffness_n_per_m, b.stiffness_n_per_m]),
-            (one, other) => one.or(other).unwrap_or(restitution),
+        let own = match (a.restitution, b.restitution) {
+            (Some(e_a), Some(e_b)) => Some(composite([e_a, e_b], [a.stiffness_n_per_m, b.stiffness_n_per_m])),
+            (one, other) => one.or(other),
         };
-        Self::Impulse { restitution }
+        match (self, own) {
+            (Self::Force | Self::Bounce { .. }, Some(restitution)) => Self::Bounce { restitution },
+            (Self::Impulse { .. }, Some(restitution)) => Self::Impulse { restitution },
+            (_, None) => self,
+        }
     }
 }
 

@@ -10,7 +10,8 @@
 use haptics::{Entity, Shape};
 
 use crate::broad_phase::BroadPhase;
-use crate::pair::{Head, Pair, Response, Surfacing};
+use crate::contacts::Contacts;
+use crate::pair::{Head, Pair, Surfacing};
 
 /// Pairs, and which bodies and entities they are of.
 #[derive(Debug, Clone)]
@@ -54,7 +55,7 @@ pub(crate) struct Who<'w> {
     /// Of each entity, its body.
     pub(crate) bodies: &'w [Option<u32>],
     /// How contacts between entities answer.
-    pub(crate) response: Response,
+    pub(crate) contacts: Contacts,
 }
 
 impl Pairs {
@@ -176,7 +177,7 @@ impl Pairs {
         };
         let entities = [who.entities[first], second];
         let both = entities.map(|entity| &who.all[entity]);
-        let surfacing = Surfacing::between(both[0], both[1], who.response);
+        let surfacing = Surfacing::between(both[0], both[1], &who.contacts);
         let has_mesh = both.iter().any(|entity| matches!(entity.shape, Shape::Mesh(_)));
         self.pool[place as usize].begin(entities, has_mesh, surfacing, was_put);
         self.awake.insert(place_in_order, Key::new([first as u32, second as u32], true, place));

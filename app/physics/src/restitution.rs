@@ -9,7 +9,7 @@
 //! [`Meeting`].
 //! Invariant: forces and velocities belong together, and forces on users are those that bodies got: an impulse is a force of its
 //! row for the tick. So momentum is that of the forces, and no impulse adds energy.
-//! Cost: nothing where nothing meets but a look at each row of the impulse response.
+//! Cost: nothing where nothing meets but a look at each row that may bounce.
 
 mod bounce;
 mod cascade;
@@ -21,7 +21,7 @@ use crate::row::Row;
 use crate::solver::{Motion, Solved, Solver};
 use bounce::{Bounce, Impulses};
 use cascade::Cascade;
-pub(crate) use meeting::Meeting;
+pub(crate) use meeting::{Meeting, Stop};
 
 /// Room for the impulses of a tick.
 #[derive(Debug, Clone, Default)]
@@ -70,11 +70,20 @@ impl Restitution {
             let row = &mut rows[meeting.row];
             meeting.is_among_many =
                 [Some(row.body), row.other].iter().flatten().any(|&body| islands.are_many(body));
-            if let (false, Some(leaves_m_s)) = (meeting.is_among_many, meeting.leaves_m_s(dt_s)) {
-                meeting.reflect(row, leaves_m_s, dt_s);
-                impacts.push(meeting.row);
-            } else {
-                stops.push(meeting.row);
+            match meeting.leaves_m_s(dt_s).filter(|_| !meeting.is_among_many) {
+                Some(leaves_m_s) => {
+                    meeting.reflect(row, leaves_m_s, dt_s);
+                    impacts.push(meeting.row);
+                }
+                None if meeting.stops(dt_s) => {
+                    let in_order = meeting.is_among_many && meeting.bounces();
+                    if !in_order && meeting.meets(dt_s) {
+                        meeting.stop(row, dt_s);
+                    }
+                    stops.push(meeting.row);
+                }
+                // Its spring presses.
+                None => {}
             }
         }
         cascade.run(meetings, rows, motions, dt_s);
@@ -86,7 +95,7 @@ impl Restitution {
 }
 
 /// Velocity of the body's point relative to the other's.
-fn velocity(row: &Row, motions: &[Motion]) -> Vector3<f64> {
+pub(crate) fn velocity(row: &Row, motions: &[Motion]) -> Vector3<f64> {
     let own_W = motions[row.body].at(&row.arms_W[0]);
     row.other.map_or(own_W, |other| own_W - motions[other].at(&row.arms_W[1]))
 }

@@ -1,6 +1,6 @@
 //! What runs, but hardly as meant.
 
-use super::together;
+use super::{contacts, together};
 use crate::rig::{Rig, in_words};
 use crate::study::stiffness::bounds::Theory;
 use crate::study::stiffness::case::{Axis, Case, Hand, Mode};
@@ -8,11 +8,10 @@ use crate::study::stiffness::search::Found;
 use crate::study::stiffness::trial::Bench;
 use haptics::{Door, Entity, Finger, Hip, Limits, Passage, SLAB_M};
 use io_driver::sim::hand::model_file::Firmness;
-use physics::collide::{ContactPoints, PairMemory, Solid, bounding_ball, contact_points, is_collidable};
 use std::collections::BTreeMap;
 use std::path::Path;
 use world::model;
-use world::{MassSpec, Scene, ShapeSpec};
+use world::{Scene, ShapeSpec};
 
 /// All of them.
 pub(super) fn all(rig: &Rig, whole: &Scene, entities: &[Entity]) -> Vec<String> {
@@ -20,7 +19,7 @@ pub(super) fn all(rig: &Rig, whole: &Scene, entities: &[Entity]) -> Vec<String> 
     let mut warnings = too_stiff(rig, &mut stands);
     warnings.extend(too_damped(rig));
     warnings.extend(together::too_much(rig, entities, &mut stands));
-    warnings.extend(overlaps(rig, entities));
+    warnings.extend(contacts::all(rig, entities));
     warnings.extend(inside(rig, entities));
     warnings.extend(closed(rig, entities));
     warnings.extend(idle_faces(rig));
@@ -136,79 +135,6 @@ fn limit(period_ns: u64, damping_n_s_per_m: f64) -> Option<f64> {
     }
 }
 
-/// Things that move and begin deeper in others than their weight brings them.
-fn overlaps(rig: &Rig, entities: &[Entity]) -> Vec<String> {
-    let mut found = Vec::new();
-    let mut pairs = 0_usize;
-    near_pairs(rig, entities, |a, b| {
-        let depth_m = depth(&entities[a], &entities[b]);
-        if depth_m > depth_of_weight(rig, a, entities).max(LEAST_DEPTH_M) {
-            pairs += 1;
-            if found.len() < MOST_OVERLAPS {
-                let [a, b] = [a, b].map(|index| &rig.scene.entities[index].name);
-                found.push(format!("{a} begins {:.2} mm deep in {b}, and will be thrown out", depth_m * 1e3));
-            }
-        }
-    });
-    if pairs > found.len() {
-        found.push(format!("and {} more pairs begin in each other", pairs - found.len()));
-    }
-    found
-}
-
-/// Each pair of which one moves, whose bounding balls meet, once; the one that moves first.
-fn near_pairs(rig: &Rig, entities: &[Entity], mut meet: impl FnMut(usize, usize)) {
-    let is_body = |index: usize| rig.scene.entities[index].motion.is_some();
-    let balls: Vec<_> = entities
-        .iter()
-        .map(|entity| {
-            bounding_ball(&entity.shape).map(|(c, r)| (entity.X_WB.transform_point(&c.into()).coords, r))
-        })
-        .collect();
-    // Swept along x: what has no end is near to everything.
-    let mut order: Vec<usize> = (0..entities.len()).filter(|&index| entities[index].is_collidable).collect();
-    let begin = |index: usize| balls[index].map_or(f64::NEG_INFINITY, |(centre, radius)| centre.x - radius);
-    let end = |index: usize| balls[index].map_or(f64::INFINITY, |(centre, radius)| centre.x + radius);
-    order.sort_by(|&a, &b| begin(a).total_cmp(&begin(b)).then(a.cmp(&b)));
-    let mut open: Vec<usize> = Vec::new();
-    for &next in &order {
-        open.retain(|&other| end(other) >= begin(next));
-        for &other in &open {
-            let apart = balls[other].zip(balls[next]).is_some_and(|((p, r), (q, s))| (p - q).norm() > r + s);
-            match (is_body(next), is_body(other)) {
-                _ if apart || entities[other].space != entities[next].space => {}
-                (true, _) => meet(next, other),
-                (false, true) => meet(other, next),
-                _ => {}
-            }
-        }
-        open.push(next);
-    }
-}
-
-fn depth(a: &Entity, b: &Entity) -> f64 {
-    let (a, b) = if is_collidable(&a.shape, &b.shape) { (a, b) } else { (b, a) };
-    if !is_collidable(&a.shape, &b.shape) {
-        return 0.0;
-    }
-    let (mut memory, mut points) = (PairMemory::default(), ContactPoints::default());
-    let solid = |entity| -> Solid<'_> {
-        let entity: &Entity = entity;
-        Solid { shape: &entity.shape, X_W: &entity.X_WB }
-    };
-    contact_points(solid(a), solid(b), 0.0, &mut memory, &mut points);
-    points.as_slice().iter().map(|point| -point.gap_m).fold(0.0, f64::max)
-}
-
-/// How deep its weight alone would bring it into something as soft as itself, on one point.
-fn depth_of_weight(rig: &Rig, body: usize, entities: &[Entity]) -> f64 {
-    let mass_kg = match rig.scene.entities[body].motion.map(|motion| motion.mass) {
-        Some(MassSpec::Mass(mass_kg)) => mass_kg,
-        _ => 0.0,
-    };
-    2.0 * mass_kg * rig.scene.gravity_m_s2.norm() / entities[body].stiffness_n_per_m
-}
-
 /// Fingers that begin inside of something: they are pushed out as the run begins.
 fn inside(rig: &Rig, entities: &[Entity]) -> Vec<String> {
     let touched = |finger: &world::SceneFinger| {
@@ -277,8 +203,5 @@ fn unseen(whole: &Scene) -> Vec<String> {
     unread.into_iter().chain(plain).collect()
 }
 
-/// A tenth of a millimetre is what rounding in a file leaves.
-const LEAST_DEPTH_M: f64 = 1e-4;
 /// Doors are tried from so far to so far (m).
 const TRIED_M: f64 = 2.0 * SLAB_M;
-const MOST_OVERLAPS: usize = 10;

@@ -45,6 +45,8 @@ impl Backpressure {
 pub(crate) struct Progress {
     /// Rows taken from the queue so far, or steps of what is slower than rows.
     taken: AtomicU64,
+    /// Rows that have reached the file.
+    written: AtomicU64,
     /// How many there were when a wait was in vain, and one; 0: none was.
     stuck: AtomicU64,
     /// Nobody who waits has anything more for it.
@@ -60,6 +62,16 @@ impl Progress {
     /// Rows taken.
     pub(crate) fn taken(&self) -> u64 {
         self.taken.load(Ordering::Relaxed)
+    }
+
+    /// So many rows have reached the file.
+    pub(super) fn wrote(&self, rows: u64) {
+        self.written.store(rows, Ordering::Relaxed);
+    }
+
+    /// Rows that have reached it.
+    pub(super) fn written(&self) -> u64 {
+        self.written.load(Ordering::Relaxed)
     }
 
     /// Ends it for whoever waits, for good.

@@ -177,6 +177,11 @@ impl McapFile {
         Self { is_current: true, ..self }
     }
 
+    /// Rows in the file.
+    pub(super) fn rows(&self) -> u64 {
+        self.rows
+    }
+
     /// No row has come, and the file has its earlier content.
     pub fn is_as_before(&self) -> bool {
         let Beginning { has_content, has_rows } = &*self.beginning;
@@ -496,16 +501,35 @@ impl WholeWrites {
         }
     }
 
-    /// The file as it is to be for so many bytes more.
-    fn start(&mut self, bytes: u64) -> io::Result<()> {
-        self.file.start(bytes)?;
-        self.beginning.has_content.store(false, Ordering::Relaxed);
+    /// Writes all of it, or none that stays.
+    fn write_whole(&mut self, bytes: &[u8]) -> io::Result<()> {
+        let mut done = 0;
+        let written = loop {
+            if done == bytes.len() {
+                break Ok(());
+            }
+            match self.file.file().write(&bytes[done..]) {
+                Ok(0) => break Err(io::ErrorKind::WriteZero.into()),
+                Ok(more) => done += more,
+                Err(error) if error.kind() == io::ErrorKind::Interrupted => {}
+                Err(error) => break Err(error),
+            }
+        };
+        if done > 0 {
+            self.beginning.has_content.store(false, Ordering::Relaxed);
+            self.file.give_up_content(done as u64)?;
+        }
+        written?;
+        self.written_bytes += done as u64;
         Ok(())
     }
 
-    /// Cuts off what has reached the file in part. The file has been started: earlier content is not cut.
+    /// Cuts off what has reached the file in part, unless it has its earlier content still.
     fn end(&mut self) {
         self.has_ended = true;
+        if self.file.has_content() {
+            return;
+        }
         // If even this fails, readers skip the last piece.
         let _ = self.file.file().set_len(self.written_bytes);
         let _ = self.file.file().seek(SeekFrom::Start(self.written_bytes));
@@ -528,15 +552,14 @@ impl Write for WholeWrites {
             return Err(io::Error::other("an earlier write failed"));
         }
         if self.beginning.has_rows.load(Ordering::Relaxed)
-            && let Err(refused) = self.start(bytes)
+            && let Err(refused) = self.file.start(bytes)
         {
             self.has_ended = true;
             return Err(refused);
         }
-        let written = self.file.file().write_all(&pending);
-        match written {
-            Ok(()) => self.written_bytes += pending.len() as u64,
-            Err(_) => self.end(),
+        let written = self.write_whole(&pending);
+        if written.is_err() {
+            self.end();
         }
         self.pending = pending;
         self.pending.clear();

@@ -3,10 +3,11 @@
 //! Problem: a run that cannot start, because another of its files cannot be made, or there is no thread or no memory for
 //! it, must not cost an earlier recording; nor may one process empty what another one writes.
 //! Model: a regular file is claimed when it is opened, until it is closed. The standard output is not: who opened it lets
-//! whom they want write there. A file with content keeps it until its first piece with a row can be written, for which room
+//! whom they want write there. A file with content keeps it until its first piece with a row is written, for which room
 //! is reserved then ([`Opened::start`]); that its beginning alone will fit is found out before the run
 //! ([`Opened::reserve`]). The piece is written over the content, in whose room and the reserved one it lies: also on a disk
-//! that others fill meanwhile. Any other file begins at once.
+//! that others fill meanwhile. File systems that copy what is written over (btrfs) reserve no room for that, and refuse the
+//! piece itself: so the rest of the content is cut off behind it, and not before. Any other file begins at once.
 //! Invariant: what was opened and not started is as it was: a file that was made here is removed again.
 
 use super::destination::{is_standard_output, shown};
@@ -153,20 +154,31 @@ impl Opened {
         }
     }
 
-    /// Gives up the content, if there is some, for a first piece of so many bytes, which is to be written at once; keeps
-    /// the file from now on whatever becomes of it.
+    /// Makes ready for a first piece of so many bytes, which is to be written at once, over the content if there is some.
     ///
     /// # Errors
     /// If the piece will not fit, or the system refuses: the file is as it was.
     pub(super) fn start(&mut self, first_bytes: u64) -> io::Result<()> {
-        if self.has_content() {
-            self.reserve(first_bytes)?;
-            // The room of what stays is that of the piece.
-            if self.file.metadata()?.len() > first_bytes {
-                self.file.set_len(first_bytes)?;
-            }
+        self.reserve(first_bytes)?;
+        if !self.has_content() {
+            self.before = Before::Stays;
+        }
+        Ok(())
+    }
+
+    /// Gives up the content behind so many bytes, which have been written over it; the file stays from now on, whatever
+    /// becomes of it.
+    ///
+    /// # Errors
+    /// Refusal by the system.
+    pub(super) fn give_up_content(&mut self, written_bytes: u64) -> io::Result<()> {
+        if !self.has_content() {
+            return Ok(());
         }
         self.before = Before::Stays;
+        if self.file.metadata()?.len() > written_bytes {
+            self.file.set_len(written_bytes)?;
+        }
         Ok(())
     }
 
@@ -176,6 +188,7 @@ impl Opened {
     /// If the system refuses.
     pub fn empty(mut self) -> io::Result<File> {
         self.start(0)?;
+        self.give_up_content(0)?;
         self.file.try_clone()
     }
 
@@ -240,6 +253,7 @@ fn open_or_make(path: &Path) -> io::Result<(File, Option<PathBuf>)> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::record::whole_lines::WholeLines;
 
     #[test]
     fn a_file_keeps_its_content_until_it_is_emptied_and_one_that_was_made_for_nothing_is_removed() {
@@ -256,6 +270,30 @@ mod tests {
             Opened::open(path).and_then(Opened::empty).expect("created");
             assert_eq!(std::fs::read(path).expect("readable"), b"");
         }
+    }
+
+    /// As on a full disk whose file system copies what is written over: room is promised, and then there is none.
+    #[test]
+    fn a_first_piece_that_does_not_fit_after_all_leaves_the_content() {
+        use rustix::fs::{MemfdFlags, SealFlags, fcntl_add_seals, memfd_create};
+        use std::io::{Read, Write};
+        let flags = MemfdFlags::ALLOW_SEALING | MemfdFlags::CLOEXEC;
+        let made = File::from(memfd_create("content", flags).expect("memory"));
+        (&made).write_all(b"earlier rows").expect("room");
+        fcntl_add_seals(&made, SealFlags::WRITE).expect("a seal");
+        let read = || {
+            let mut text = String::new();
+            let mut file = File::open(format!("/proc/self/fd/{}", std::os::fd::AsRawFd::as_raw_fd(&made)));
+            file.as_mut().expect("open").read_to_string(&mut text).expect("text");
+            text
+        };
+        let file = made.try_clone().expect("a descriptor");
+        let mut lines = WholeLines::begin(Opened::of(file, Path::new("content")), "head").expect("begun");
+        lines.append(0, |line| line.push('1')).and_then(|()| lines.flush()).expect_err("no room");
+        assert!(lines.has_content());
+        assert_eq!(read(), "earlier rows");
+        drop(lines);
+        assert_eq!(read(), "earlier rows");
     }
 
     #[test]

@@ -37,6 +37,15 @@ impl RecordFile {
         }
     }
 
+    /// Rows in the file itself; of events none is one.
+    pub(super) fn rows(&self) -> u64 {
+        match self {
+            Self::Csv(file) => file.rows(),
+            Self::Mcap(file) => file.rows(),
+            Self::Events(_) => 0,
+        }
+    }
+
     pub(super) fn append(&mut self, row: &Row, bodies: &[BodyRow]) -> Result<(), RecordingError> {
         match self {
             Self::Csv(file) => file.append(row, bodies),

@@ -104,6 +104,8 @@ pub struct Recorder {
     period_ns: u64,
     /// The row that was sent last.
     last_tick: u64,
+    /// Rows that were handed over.
+    sent: u64,
     lost: u64,
     /// Of these, those after the row that was sent last.
     untold: u64,
@@ -174,6 +176,7 @@ impl Recorder {
             period_ns,
             last_tick: 0,
             lost: 0,
+            sent: 0,
             untold: 0,
             given_up: None,
             shared,
@@ -226,6 +229,7 @@ impl Recorder {
             return;
         }
         self.last_tick = row.run_tick;
+        self.sent += 1;
         for (known, body) in self.known.iter_mut().zip(bodies) {
             *known = Some(*body);
         }
@@ -259,8 +263,8 @@ impl Recorder {
         let is_given_up = self.shared.progress.is_given_up();
         if is_given_up && self.given_up.is_none() {
             let why = format!(
-                "cannot write the recording {}: nothing was written for {} s; the run goes on without it; what comes \
-                 behind t = {:?} s is not in it",
+                "cannot write the recording {}: nothing was written for {} s; the run goes on without it; what it has ends \
+                 at t = {:?} s at the latest",
                 shown(&self.path).display(),
                 self.backpressure.patience().as_secs(),
                 run_time_s(self.last_tick.cast_signed(), self.period_ns)
@@ -365,12 +369,12 @@ impl Recorder {
             say(format_args!("phantom3: {why}"));
             why
         });
-        let rows = self.shared.progress.taken();
+        let rows = self.shared.progress.written();
         Recorded {
             path: self.path,
             rows,
             unit: self.unit,
-            lost: self.lost,
+            lost: self.lost + self.sent.saturating_sub(rows),
             failure: Some(why),
             is_as_before: false,
         }
@@ -425,6 +429,7 @@ impl RecorderThread {
                 if let Err(error) = written {
                     result = self.abandon(error);
                 }
+                self.shared.progress.wrote(self.file.as_ref().map_or(0, RecordFile::rows));
             }
             if is_closing {
                 break;

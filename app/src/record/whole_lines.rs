@@ -104,10 +104,15 @@ impl WholeLines {
                 Err(error) => break Err(error),
             }
         };
-        self.keep_whole_lines(done);
+        let (started, mut result) = (done > 0 || written.is_ok(), written);
+        if started {
+            let cut = self.file.give_up_content(done as u64);
+            result = result.and(cut);
+            self.keep_whole_lines(done);
+        }
         self.buffer.clear();
         self.ends.clear();
-        written
+        result
     }
 
     /// It has what it had before, and nothing of what is gathered.

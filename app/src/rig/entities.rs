@@ -27,6 +27,10 @@ impl Rig {
                 Some(restitution) => entity.with_restitution(restitution),
                 None => Ok(entity),
             })
+            .and_then(|entity| match spec.contact_stiffness_n_per_m {
+                Some(stiffness_n_per_m) => entity.with_contact_stiffness(stiffness_n_per_m),
+                None => Ok(entity),
+            })
             .map(|entity| entity.with_algorithm(algorithm).with_shading(shading))
             .map_err(refused)?;
         let entity = if spec.faces.is_empty() {

@@ -4,12 +4,12 @@ use haptics::{Entity, ParameterError, Shape};
 use io_driver::say::say;
 use physics::collide::{self, can_move, is_collidable};
 use physics::{
-    Attachment, Body, BodyError, FingerSettings, HeldOrientation, Integrator, MassProperties, Response,
-    Settings, Sleep, SoftFinger, TorsionModel,
+    Attachment, Body, BodyError, ContactStiffness, Contacts, FingerSettings, HeldOrientation, Integrator,
+    MassProperties, Response, Settings, Sleep, SoftFinger, TorsionModel,
 };
 use world::{
-    AttachSpec, AttachedOrientation, IntegratorSpec, MassSpec, MotionSpec, ResponseSpec, SceneEntity,
-    SceneFinger, SoftModelSpec, SoftSpec,
+    AttachSpec, AttachedOrientation, ContactStiffnessSpec, IntegratorSpec, MassSpec, MotionSpec,
+    ResponseSpec, SceneEntity, SceneFinger, SoftModelSpec, SoftSpec,
 };
 
 use super::{Rig, RigError};
@@ -43,13 +43,10 @@ impl Rig {
         self.bodies(entities).filter_map(|body| body.ok().map(|(index, body)| (index, body.mass.mass_kg)))
     }
 
-    pub(super) fn with_objects(
-        &self,
-        step: FastStep,
-        bodies: &[(usize, Body)],
-    ) -> Result<FastStep, RigError> {
+    /// What holds for all bodies.
+    fn dynamics(&self) -> Settings {
         let dynamics = self.scene.dynamics;
-        let settings = Settings {
+        Settings {
             gravity_W: self.scene.gravity_m_s2,
             integrator: match dynamics.integrator {
                 IntegratorSpec::Implicit => Integrator::Implicit,
@@ -59,12 +56,34 @@ impl Rig {
                 IntegratorSpec::ThesisEulerPrinted => Integrator::ThesisEulerPrinted,
             },
             response: match dynamics.response {
-                ResponseSpec::Force => Response::Force,
+                ResponseSpec::Force { restitution: None } => Response::Force,
+                ResponseSpec::Force { restitution: Some(restitution) } => Response::Bounce { restitution },
                 ResponseSpec::Impulse { restitution } => Response::Impulse { restitution },
+            },
+            contact_stiffness: match dynamics.stiffness {
+                ContactStiffnessSpec::AsFelt => ContactStiffness::AsFelt,
+                ContactStiffnessSpec::ByMass { damping_ratio } => ContactStiffness::ByMass { damping_ratio },
+                ContactStiffnessSpec::Given { stiffness_n_per_m, damping_ratio } => {
+                    ContactStiffness::Given { stiffness_n_per_m, damping_ratio }
+                }
             },
             sleep: dynamics.sleep.then(Sleep::default),
             ..Settings::default()
-        };
+        }
+    }
+
+    /// Contacts between entities, as a run has them.
+    pub(crate) fn contacts(&self, entities: &[Entity]) -> Contacts {
+        let heaviest_kg = self.masses(entities).map(|(_, mass_kg)| mass_kg).fold(0.0, f64::max);
+        self.dynamics().contacts(heaviest_kg)
+    }
+
+    pub(super) fn with_objects(
+        &self,
+        step: FastStep,
+        bodies: &[(usize, Body)],
+    ) -> Result<FastStep, RigError> {
+        let (dynamics, settings) = (self.scene.dynamics, self.dynamics());
         // Which entity it is, is not told; the first that moves is named.
         let first = |source| no_body(&self.scene.entities[bodies[0].0], source);
         let hand: Vec<HandFinger> =

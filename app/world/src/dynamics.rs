@@ -1,4 +1,4 @@
-//! How a scene's moving entities are computed: `integrator`, `contact_response`, `grasp_quality`, `sleep` and `lists`; and
+//! How a scene's moving entities are computed: `integrator`, `contact_response`, `contact_stiffness`, `grasp_quality`, `sleep` and `lists`; and
 //! what an entity's `restitution` is.
 
 use crate::error::SceneError;
@@ -14,6 +14,8 @@ pub struct DynamicsSpec {
     pub integrator: IntegratorSpec,
     /// How contacts between entities answer.
     pub response: ResponseSpec,
+    /// How stiff contacts between entities are that do not say it themselves.
+    pub stiffness: ContactStiffnessSpec,
     /// Whether it is told how good the grasp of each is.
     pub grasp_quality: bool,
     /// Whether what rests falls asleep.
@@ -27,6 +29,7 @@ impl Default for DynamicsSpec {
         Self {
             integrator: IntegratorSpec::default(),
             response: ResponseSpec::default(),
+            stiffness: ContactStiffnessSpec::default(),
             grasp_quality: false,
             sleep: true,
             lists: ListSettings::default(),
@@ -51,16 +54,49 @@ pub enum IntegratorSpec {
 }
 
 /// How contacts between entities answer.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub enum ResponseSpec {
-    /// By a spring and a damper.
-    #[default]
-    Force,
+    /// By a spring and a damper; what meets is reflected before, if anybody says by how much.
+    Force {
+        /// Share of the approaching velocity that comes back, 0 to 1, where no entity says.
+        restitution: Option<f64>,
+    },
     /// By reflected velocities.
     Impulse {
         /// Share of the approaching velocity that comes back, 0 to 1, where no entity says.
         restitution: f64,
     },
+}
+
+/// How stiff contacts between entities are that do not say it themselves; their dampers are this share of the critical one.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum ContactStiffnessSpec {
+    /// As fingers feel both surfaces, with both dampers.
+    AsFelt,
+    /// By the mass of the heaviest thing that moves.
+    ByMass {
+        /// 1: critical.
+        damping_ratio: f64,
+    },
+    /// The same for all.
+    Given {
+        /// Of each contact point \[N/m\].
+        stiffness_n_per_m: f64,
+        /// 1: critical.
+        damping_ratio: f64,
+    },
+}
+
+impl Default for ContactStiffnessSpec {
+    fn default() -> Self {
+        Self::ByMass { damping_ratio: 1.0 }
+    }
+}
+
+impl Default for ResponseSpec {
+    fn default() -> Self {
+        Self::Force { restitution: None }
+    }
 }
 
 impl DynamicsSpec {
@@ -79,7 +115,16 @@ impl DynamicsSpec {
         let grasp_quality = scene.get("grasp_quality").map_or(Ok(false), |value| value.truth())?;
         let sleep = scene.get("sleep").map_or(Ok(true), |value| value.truth())?;
         let lists = scene.get("lists").map_or(Ok(ListSettings::default()), |value| read_lists(&value))?;
-        Ok(Self { integrator, response: response.unwrap_or_default(), grasp_quality, sleep, lists })
+        let stiffness = scene.get("contact_stiffness").map(|value| ContactStiffnessSpec::read(&value));
+        let stiffness = stiffness.transpose()?.unwrap_or_default();
+        Ok(Self {
+            integrator,
+            response: response.unwrap_or_default(),
+            stiffness,
+            grasp_quality,
+            sleep,
+            lists,
+        })
     }
 }
 
@@ -88,26 +133,49 @@ impl ResponseSpec {
         let table = value.table(ALLOWED)?;
         table.check_keys(&KEYS)?;
         let kind = table.require("kind", "force, impulse")?.choose("contact response", &RESPONSES)?;
-        let Some(restitution) = table.get("restitution") else {
-            return Ok(if kind == "force" { Self::Force } else { Self::Impulse { restitution: 0.0 } });
-        };
-        let allowed = "a number from 0 to 1, with kind = \"impulse\"";
-        match restitution.number(Bound::NotNegative)? {
-            share if kind == "impulse" && share <= 1.0 => Ok(Self::Impulse { restitution: share }),
-            _ => Err(restitution.out_of_range(allowed)),
-        }
+        let restitution = read_restitution(&table)?;
+        Ok(match kind {
+            "force" => Self::Force { restitution },
+            _ => Self::Impulse { restitution: restitution.unwrap_or(0.0) },
+        })
     }
+}
 
-    /// How much an entity gives back of an approaching velocity, if it says; only velocities that are reflected ask for it.
-    pub(crate) fn read_restitution(self, entity: &Table<'_>) -> Result<Option<f64>, SceneError> {
-        let Some(value) = entity.get("restitution") else { return Ok(None) };
-        match (value.number(Bound::NotNegative)?, self) {
-            (share, _) if share > 1.0 => Err(value.out_of_range("a number from 0 to 1")),
-            (share, Self::Impulse { .. }) => Ok(Some(share)),
-            (_, Self::Force) => Err(value.out_of_range(
-                "none while contacts are springs with dampers: say `contact_response = { kind = \"impulse\" }` at the \
-                 top of the scene, or leave out `restitution`",
-            )),
+/// How much of an approaching velocity comes back, if the table says.
+pub(crate) fn read_restitution(table: &Table<'_>) -> Result<Option<f64>, SceneError> {
+    let Some(value) = table.get("restitution") else { return Ok(None) };
+    match value.number(Bound::NotNegative)? {
+        share if share > 1.0 => Err(value.out_of_range("a number from 0 to 1")),
+        share => Ok(Some(share)),
+    }
+}
+
+impl ContactStiffnessSpec {
+    fn read(value: &Value<'_>) -> Result<Self, SceneError> {
+        let table = value.table(STIFFNESS_EXAMPLE)?;
+        table.check_keys(&STIFFNESS_KEYS)?;
+        let kind = table.require("kind", "by-mass, as-felt, given")?;
+        let kind = kind.choose("contact stiffness", &STIFFNESSES)?;
+        let damping_ratio = table.number_or("damping_ratio", Bound::NotNegative, 1.0)?;
+        let unfit = |key: &str, allowed: &str| match table.get(key) {
+            Some(value) => Err(value.out_of_range(allowed)),
+            None => Ok(()),
+        };
+        match kind {
+            "given" => {
+                let stiffness_n_per_m =
+                    table.require("stiffness_n_per_m", STIFFNESS_EXAMPLE)?.number(Bound::Positive)?;
+                Ok(Self::Given { stiffness_n_per_m, damping_ratio })
+            }
+            "as-felt" => {
+                unfit("damping_ratio", "none with kind = \"as-felt\": dampers are the entities' own")?;
+                unfit("stiffness_n_per_m", "none, but with kind = \"given\"")?;
+                Ok(Self::AsFelt)
+            }
+            _ => {
+                unfit("stiffness_n_per_m", "none, but with kind = \"given\"")?;
+                Ok(Self::ByMass { damping_ratio })
+            }
         }
     }
 }
@@ -140,8 +208,14 @@ const LISTS_EXAMPLE: &str =
     "a table such as { near_m = 0.01, far_m = 0.05, ahead_s = 0.05, fast_bodies = 64 }";
 const LISTS_KEYS: Vocabulary =
     Vocabulary { available: &["near_m", "far_m", "ahead_s", "fast_bodies"], later: &[] };
-const ALLOWED: &str = "a table such as { kind = \"impulse\", restitution = 0.5 } or { kind = \"force\" }";
+const ALLOWED: &str =
+    "a table such as { kind = \"impulse\", restitution = 0.5 } or { kind = \"force\", restitution = 0.5 }";
 const KEYS: Vocabulary = Vocabulary { available: &["kind", "restitution"], later: &[] };
+const STIFFNESS_EXAMPLE: &str = "a table such as { kind = \"by-mass\", damping_ratio = 1.0 }, { kind = \"as-felt\" } or \
+                                 { kind = \"given\", stiffness_n_per_m = 1e5 }";
+const STIFFNESS_KEYS: Vocabulary =
+    Vocabulary { available: &["kind", "stiffness_n_per_m", "damping_ratio"], later: &[] };
+const STIFFNESSES: Vocabulary = Vocabulary { available: &["by-mass", "as-felt", "given"], later: &[] };
 const RESPONSES: Vocabulary = Vocabulary { available: &["force", "impulse"], later: &[] };
 const INTEGRATORS: Vocabulary = Vocabulary {
     available: &["implicit", "rk4", "thesis-euler", "thesis-euler-gyroscopic", "thesis-euler-printed"],

@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use nalgebra::{Isometry3, Translation3, Vector3};
 
-use crate::dynamics::ResponseSpec;
+use crate::dynamics;
 use crate::effects::{MagnetismSpec, VibrationSpec};
 use crate::error::SceneError;
 use crate::faces::{FacesSpec, Usual};
@@ -48,6 +48,8 @@ pub struct SceneEntity {
     pub faces: Vec<FacesSpec>,
     /// Share of an approaching velocity that comes back, 0 to 1; default what the other entity, or the scene, says.
     pub restitution: Option<f64>,
+    /// Of each point where another entity touches it \[N/m\], if it says.
+    pub contact_stiffness_n_per_m: Option<f64>,
     /// Default the Friction Cone Algorithm.
     pub algorithm: AlgorithmSpec,
     /// What it is made of, if the scene says; it gave the values that the scene did not.
@@ -104,19 +106,16 @@ impl SceneEntity {
         table: &Table<'d>,
         i: usize,
         names: &mut Names<'d>,
-        response: ResponseSpec,
         problems: &mut Problems,
     ) -> Vec<Self> {
         problems.keys(table, &KEYS);
         let Some(grid) = problems.keep(Grid::read(table)) else { return Vec::new() };
         let Some(grid) = grid else {
             let name = problems.keep(names.claim(table, format!("e{i}")));
-            return Self::read(table, name.unwrap_or_default(), None, response, problems)
-                .into_iter()
-                .collect();
+            return Self::read(table, name.unwrap_or_default(), None, problems).into_iter().collect();
         };
         let base = problems.keep(name_of(table)).flatten().unwrap_or_else(|| format!("e{i}"));
-        let Some(first) = Self::read(table, base, None, response, problems) else { return Vec::new() };
+        let Some(first) = Self::read(table, base, None, problems) else { return Vec::new() };
         let mut item = |(place, offset_m): (String, Vector3<f64>)| {
             let name = format!("{}{place}", first.name);
             let name = problems.keep(names.claim_made(table, name, " (of the grid)"))?;
@@ -132,7 +131,6 @@ impl SceneEntity {
         table: &Table<'_>,
         name: String,
         given: Option<(ShapeSpec, Isometry3<f64>)>,
-        response: ResponseSpec,
         problems: &mut Problems,
     ) -> Option<Self> {
         let made_of = problems.keep(read_material(table)).flatten();
@@ -153,7 +151,10 @@ impl SceneEntity {
         let truth = |key: &str| table.get(key).map_or(Ok(true), |value| value.truth());
         let (stiffness_n_per_m, damping_n_s_per_m) = (problems.keep(stiffness), problems.keep(damping));
         let friction = problems.keep(FrictionSpec::read(table, made_of));
-        let restitution = problems.keep(response.read_restitution(table));
+        let restitution = problems.keep(dynamics::read_restitution(table));
+        let contact_stiffness =
+            table.get("contact_stiffness_n_per_m").map(|value| value.number(Bound::Positive)).transpose();
+        let contact_stiffness_n_per_m = problems.keep(contact_stiffness);
         let algorithm = problems.keep(AlgorithmSpec::read(table));
         let magnetism = problems.keep(MagnetismSpec::read(table));
         let vibration = problems.keep(VibrationSpec::read(table));
@@ -185,6 +186,7 @@ impl SceneEntity {
             friction: friction?,
             faces: faces?,
             restitution: restitution?,
+            contact_stiffness_n_per_m: contact_stiffness_n_per_m?,
             algorithm: algorithm?,
             material: made_of.map(|made_of| made_of.name),
             magnetism: magnetism?,
@@ -205,11 +207,11 @@ impl SceneEntity {
     }
 
     /// Checks a template, which may leave out the shape.
-    pub(crate) fn check_template(table: &Table<'_>, response: ResponseSpec, problems: &mut Problems) {
+    pub(crate) fn check_template(table: &Table<'_>, problems: &mut Problems) {
         problems.keys(table, &KEYS);
         problems.keep(Grid::read(table));
         if table.get("shape").is_some() {
-            Self::read(table, String::new(), None, response, problems);
+            Self::read(table, String::new(), None, problems);
         }
     }
 }
@@ -258,6 +260,7 @@ const KEYS: Vocabulary = Vocabulary {
         "angular_velocity_rad_s",
         "rotation_locked",
         "restitution",
+        "contact_stiffness_n_per_m",
         "haptic",
         "collidable",
         "visual",

@@ -16,7 +16,6 @@
 
 use nalgebra::{Isometry3, Unit, Vector3};
 
-use crate::dynamics::ResponseSpec;
 use crate::entity::SceneEntity;
 use crate::error::SceneError;
 use crate::names::Names;
@@ -82,7 +81,6 @@ impl SceneEnvironment {
         i: usize,
         names: (&mut Names<'d>, &mut Names<'d>),
         entities: &mut Vec<SceneEntity>,
-        response: ResponseSpec,
         problems: &mut Problems,
     ) -> Option<Self> {
         let (own_names, entity_names) = names;
@@ -100,8 +98,7 @@ impl SceneEnvironment {
             let claimed = entity_names.claim_made(&part.table, called, " (of an environment)");
             let Some(called) = problems.keep(claimed) else { continue };
             let given = Some((part.shape, part.pose));
-            let Some(mut entity) = SceneEntity::read(&part.table, called.clone(), given, response, problems)
-            else {
+            let Some(mut entity) = SceneEntity::read(&part.table, called.clone(), given, problems) else {
                 continue;
             };
             entity.within = environment.door.as_ref().map(|_| environment.name.clone());
@@ -234,6 +231,7 @@ macro_rules! with_surface {
                 "damping_n_s_per_m",
                 "friction",
                 "restitution",
+                "contact_stiffness_n_per_m",
                 "algorithm",
                 "material",
                 "shading",

@@ -86,7 +86,7 @@ mod vocabulary;
 pub use attach::{AttachSpec, AttachedOrientation};
 pub use camera::SceneCamera;
 pub use csg::{CsgChild, CsgOp, CsgSpec};
-pub use dynamics::{DynamicsSpec, IntegratorSpec, ResponseSpec};
+pub use dynamics::{ContactStiffnessSpec, DynamicsSpec, IntegratorSpec, ResponseSpec};
 pub use effects::{MagnetismSpec, VibrationSpec};
 pub use entity::{AlgorithmSpec, EntityKind, SceneEntity};
 pub use environment::{DoorSpec, EnvironmentKind, SceneEnvironment};

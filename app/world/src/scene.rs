@@ -153,8 +153,7 @@ impl Scene {
         let dynamics = problems.keep(DynamicsSpec::read(table));
         let hand = problems.keep(read_hand(table));
         let fingers = SceneFinger::read_all(table, problems);
-        let response = dynamics.unwrap_or_default().response;
-        let things = Things::read(tables, &fingers, response, problems);
+        let things = Things::read(tables, &fingers, problems);
         let (fields, guides) =
             (problems.keep(FieldSpec::read_all(table)), problems.keep(GuideSpec::read_all(table)));
         Some(Self {
@@ -226,6 +225,7 @@ const KEYS: Vocabulary = Vocabulary {
         "gravity_m_s2",
         "integrator",
         "contact_response",
+        "contact_stiffness",
         "grasp_quality",
         "sleep",
         "lists",

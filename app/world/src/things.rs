@@ -3,7 +3,7 @@
 //! The scene's own come before included ones; default names go by the place in that list.
 
 use crate::camera::SceneCamera;
-use crate::dynamics::ResponseSpec;
+
 use crate::entity::SceneEntity;
 use crate::environment::SceneEnvironment;
 use crate::error::SceneError;
@@ -19,8 +19,6 @@ use rt_core::plain_text::quoted;
 /// All of it, as far as it could be read.
 #[derive(Debug, Default)]
 pub(crate) struct Things {
-    /// How contacts between entities answer.
-    response: ResponseSpec,
     pub(crate) entities: Vec<SceneEntity>,
     pub(crate) environments: Vec<SceneEnvironment>,
     pub(crate) lights: Vec<SceneLight>,
@@ -29,14 +27,9 @@ pub(crate) struct Things {
 }
 
 impl Things {
-    pub(crate) fn read<'d>(
-        files: &[Table<'d>],
-        fingers: &[SceneFinger],
-        response: ResponseSpec,
-        problems: &mut Problems,
-    ) -> Self {
-        let mut templates = read_templates(files, response, problems);
-        let mut things = Self { response, ..Self::default() };
+    pub(crate) fn read<'d>(files: &[Table<'d>], fingers: &[SceneFinger], problems: &mut Problems) -> Self {
+        let mut templates = read_templates(files, problems);
+        let mut things = Self::default();
         let mut names = Names::default();
         let entities = all(files, "entity", problems);
         things.read_entities(&entities, &mut templates, &mut names, problems);
@@ -64,7 +57,7 @@ impl Things {
     ) {
         for (i, table) in tables.iter().enumerate() {
             let Some(table) = problems.keep(templates.complete(table.clone())) else { continue };
-            let read = SceneEntity::read_all(&table, i, names, self.response, problems);
+            let read = SceneEntity::read_all(&table, i, names, problems);
             templates.used(&table, read.len());
             self.entities.extend(read);
             if self.entities.len() > MAX_ENTITIES {
@@ -83,7 +76,7 @@ impl Things {
         let mut own_names = Names::default();
         for (i, table) in tables.iter().enumerate() {
             let both = (&mut own_names, &mut *names);
-            let read = SceneEnvironment::read(table, i, both, &mut self.entities, self.response, problems);
+            let read = SceneEnvironment::read(table, i, both, &mut self.entities, problems);
             if let Some(door) = read.as_ref().and_then(|environment| environment.door.as_ref())
                 && !names.has(&door.of)
             {
@@ -126,7 +119,7 @@ impl Things {
     }
 }
 
-fn read_templates<'d>(files: &[Table<'d>], response: ResponseSpec, problems: &mut Problems) -> Templates<'d> {
+fn read_templates<'d>(files: &[Table<'d>], problems: &mut Problems) -> Templates<'d> {
     let (mut templates, mut names) = (Templates::default(), Names::default());
     for table in all(files, "template", problems) {
         templates.add(table, &mut names, problems);
@@ -134,7 +127,7 @@ fn read_templates<'d>(files: &[Table<'d>], response: ResponseSpec, problems: &mu
     let complete: Vec<_> = templates.tables().map(|table| templates.complete(table.clone())).collect();
     for table in complete {
         if let Some(table) = problems.keep(table) {
-            SceneEntity::check_template(&table, response, problems);
+            SceneEntity::check_template(&table, problems);
         }
     }
     templates

@@ -49,6 +49,19 @@ pub(super) enum Offer {
 }
 
 impl Offer {
+    /// What took too long.
+    pub(super) fn why_overdue(&self) -> String {
+        let seconds = TAKEN_WITHIN.as_secs();
+        match self {
+            Self::Made(_) => format!(
+                "it has not mapped its memory within {seconds} s, or the memory of another is being sealed"
+            ),
+            Self::Sealing { .. } => {
+                format!("its memory could not be sealed within {seconds} s: something writes into it")
+            }
+        }
+    }
+
     /// True if it had time enough.
     pub(super) fn is_overdue(&self) -> bool {
         match self {

@@ -17,6 +17,8 @@ pub const FOR_ADMINISTRATORS: usize = 8;
 pub const MAX_OBSERVERS_OF_USER: usize = 48;
 /// Of these, one process's.
 pub const MAX_OBSERVERS_OF_PROCESS: usize = 24;
+/// Beside them, of those who command or have left unread what they were sent: whoever looks on takes none of these.
+pub const FOR_COMMANDERS: usize = 4;
 /// Who has yet to say what he wants.
 pub const MAX_ASKING: usize = 32;
 
@@ -34,8 +36,17 @@ pub(super) fn may_observe(
     observers: impl Iterator<Item = Owner>,
 ) -> bool {
     let most = if is_administrator { MAX_OBSERVERS } else { MAX_OBSERVERS - FOR_ADMINISTRATORS };
+    has_place(newcomer, most, observers)
+}
+
+/// Whether there is a place for a commander beside those who have left unread what they were sent.
+pub(super) fn may_command(newcomer: Owner, left: impl Iterator<Item = Owner>) -> bool {
+    has_place(newcomer, MAX_OBSERVERS + FOR_COMMANDERS, left)
+}
+
+fn has_place(newcomer: Owner, most: usize, others: impl Iterator<Item = Owner>) -> bool {
     let (mut all, mut of_user, mut of_process) = (0, 0, 0);
-    for owner in observers {
+    for owner in others {
         all += 1;
         of_user += usize::from(owner.uid == newcomer.uid);
         of_process += usize::from(owner == newcomer);

@@ -6,6 +6,7 @@ use patience::prelude::*;
 use shm_abi::CommanderMemory;
 use shm_abi::handshake::RequestKind;
 use shm_abi::segment::TAKEN_WITHIN;
+use shm_abi::server::ServerEvent;
 use std::fs::File;
 use std::io::Read;
 use std::os::fd::{AsFd, AsRawFd, FromRawFd, OwnedFd};
@@ -28,12 +29,14 @@ fn whoever_writes_while_its_segment_is_to_be_sealed_holds_up_nobody_but_the_next
             desk.granted(RequestKind::Observe);
         }
     });
-    assert!(desk.events.is_empty(), "nobody has got a lease: {:?}", desk.events);
     wait_until("the holder's offer is forgotten", || {
         desk.poll(SHORT);
         has_ended(&holder)
     });
     assert!(is_closed(&mut holder));
+    // Nobody has got a lease, and the reason is told.
+    let [ServerEvent::Trouble { message }] = &desk.events[..] else { panic!("{:?}", desk.events) };
+    assert!(message.contains("could not be sealed within 2 s"), "{message}");
     writer.let_go();
     // What is sealed at last was nobody's any more, and the next one gets a lease of its own.
     desk.granted(RequestKind::Command);

@@ -123,8 +123,8 @@ fn pass_on(event: ServerEvent, sender: &mut Sender) {
         ServerEvent::LeaseGranted { view, .. } => Letter::Grant(view),
         ServerEvent::ZeroRequested { devices, .. } => Letter::Zero(DeviceSet(devices)),
         ServerEvent::LeaseEnded { lease } => return sender.urgent.end_lease(lease),
-        ServerEvent::EmergencyStopRequested { uid, asked_ns, .. } => {
-            sender.urgent.stop(Some(uid), asked_ns);
+        ServerEvent::EmergencyStopRequested { user, asked_ns, .. } => {
+            sender.urgent.stop(user, asked_ns);
             return;
         }
         ServerEvent::ClearFaultRequested { asked_ns, .. } => {

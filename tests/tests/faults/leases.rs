@@ -193,7 +193,7 @@ fn a_run_whose_lease_somebody_ended_says_so_and_does_not_come_back() {
         assert_eq!(asked.out, "lease 1 is ended; its force ramps out\n");
         let end = holder.end();
         assert_eq!(end.status, Some(3), "{end:?}");
-        assert!(end.err.contains("somebody ended this run's lease"), "{end:?}");
+        assert!(end.err.contains("this run's lease has ended"), "{end:?}");
         assert!(end.out.contains("replies      "), "its report: {end:?}");
         log.follow(&press.observer.driver, "the end of the lease and of its force", |told| {
             told.last().is_some_and(|last| last.lease == 0 && !last.is_pushing())
@@ -234,7 +234,7 @@ fn a_run_whose_lease_somebody_ended_does_not_come_back_to_a_driver_that_stood_st
         asking.bounded_join().expect("no panic").expect("it is granted");
         let end = holder.end();
         assert_eq!(end.status, Some(3), "{pause_ms}: {end:?}");
-        assert!(end.err.contains("somebody ended this run's lease"), "{pause_ms}: {end:?}");
+        assert!(end.err.contains("this run's lease has ended"), "{pause_ms}: {end:?}");
         press.driver_must_live();
     }
 }

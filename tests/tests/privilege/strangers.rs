@@ -1,10 +1,12 @@
 //! Another user of the machine gets nothing of the driver: not its socket, not its memory, not its life.
 
+use patience::prelude::*;
 use rustix::process::{Pid, Signal, kill_process};
 use std::fs::File;
 use std::os::unix::fs::PermissionsExt;
 use std::os::unix::net::UnixStream;
 use std::path::{Path, PathBuf};
+use std::process::{Command, Stdio};
 use system_tests::driver::{Driver, resting};
 use system_tests::faults::process::{End, Running, role};
 use system_tests::programs::io_driver;
@@ -157,10 +159,14 @@ struct Asked {
 
 impl Asked {
     fn with(access: &str) -> Self {
+        Self::started_by(io_driver(), access)
+    }
+
+    fn started_by(command: Command, access: &str) -> Self {
         let config = resting("real", 1).replace("[real_time]", &format!("{access}[real_time]"));
         let open = open_directory();
         let socket = open.path().join("driver.sock");
-        let driver = Driver::start_at(&config, io_driver(), open, socket.clone());
+        let driver = Driver::start_at(&config, command, open, socket.clone());
         for path in [socket.clone(), shm_abi::stop_socket::path_beside(&socket)] {
             std::fs::set_permissions(path, PermissionsExt::from_mode(0o666)).expect("root may");
         }
@@ -249,6 +255,36 @@ fn without_groups_a_stop_of_others_is_for_root_and_the_drivers_user_to_undo() {
     asked.denied(bob, &[], "end-lease", those);
     assert!(lease.connection.is_open());
     asked.denied(bob, &[], "stop", those);
+    asked.granted(root, &[], "stop");
+    assert_eq!(asked.driver.wait().code(), Some(0));
+}
+
+/// As in a container without root's rights: there all users from outside have one number.
+#[test]
+fn a_stop_of_a_user_whom_the_driver_cannot_tell_from_others_is_for_administrators_to_undo() {
+    if role().is_some() || !can_be_others() {
+        return;
+    }
+    let contained = |program: &str| {
+        let mut command = Command::new("unshare");
+        command.args(["--user", "--map-root-user", program]);
+        command
+    };
+    if !contained("true").stderr(Stdio::null()).bounded_status().is_ok_and(|status| status.success()) {
+        println!("skipped: no user namespaces here");
+        return;
+    }
+    let program = io_driver();
+    let mut asked = Asked::started_by(contained(&program.get_program().to_string_lossy()), "");
+    let (ann, bob, root) = (4001, 4002, 0);
+    let those = "root and the user that the driver runs as";
+    asked.granted(ann, &[], "emergency-stop");
+    asked.denied(bob, &[], "clear-fault", those);
+    asked.denied(ann, &[], "clear-fault", those);
+    asked.granted(root, &[], "clear-fault");
+    let lease = asked.driver.command();
+    asked.denied(bob, &[], "end-lease", those);
+    assert!(lease.connection.is_open());
     asked.granted(root, &[], "stop");
     assert_eq!(asked.driver.wait().code(), Some(0));
 }

@@ -44,7 +44,7 @@ impl Manipulation {
             let entity = self.roster.entities[body];
             let ahead_W = self.roster.bodies[body].velocity_W * (dt_s * TICKS_AHEAD);
             if self.broad_phase.moved(entity, &entities[entity], &ahead_W) {
-                let who = who(&self.roster, entities, self.settings.response);
+                let who = who(&self.roster, entities, self.contacts);
                 self.pairs.follow(body, &who, &self.broad_phase, false);
             }
         }

@@ -76,7 +76,7 @@ impl Manipulation {
                 None => sleeper = Some(body as usize),
             }
         }
-        let who = who(roster, entities, self.settings.response);
+        let who = who(roster, entities, self.contacts);
         pairs.let_in(keys, |body| roster.standing(body) == Standing::Awake, &who);
         for &(body, standing) in &*bodies {
             if standing == Standing::Awake {

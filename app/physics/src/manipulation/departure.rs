@@ -64,7 +64,7 @@ impl Manipulation {
         let (roster, is_marked) = (&self.roster, &self.is_marked);
         let is_awake = |body: usize| roster.standing(body) == Standing::Awake;
         keys.clear();
-        let who = who(roster, entities, self.settings.response);
+        let who = who(roster, entities, self.contacts);
         self.pairs.take_out(|body| is_marked[body], is_awake, &who, keys);
         self.unmark(island);
         for &body in island {

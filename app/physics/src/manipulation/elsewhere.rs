@@ -19,7 +19,7 @@ impl Manipulation {
         self.wake(body, entities);
         self.roster.set(body, Standing::Elsewhere);
         let roster = &self.roster;
-        let who = who(roster, entities, self.settings.response);
+        let who = who(roster, entities, self.contacts);
         self.pairs.leave(body, |body| roster.standing(body) == Standing::Awake, &who);
     }
 
@@ -87,7 +87,7 @@ impl Manipulation {
         for at in 0..self.neighbours.len() {
             let body = self.neighbours[at] as usize;
             if self.roster.standing(body) == Standing::Awake {
-                let who = who(&self.roster, entities, self.settings.response);
+                let who = who(&self.roster, entities, self.contacts);
                 self.pairs.follow(body, &who, &self.broad_phase, was_put);
             }
         }

@@ -18,7 +18,7 @@ impl Manipulation {
         self.gets[self.roster.awake().len()..].iter_mut().for_each(|gets| gets.is_fixed = true);
         // Impulses are always solved for.
         let springs = match self.settings.response {
-            Response::Force => self.rows.len(),
+            Response::Force | Response::Bounce { .. } => self.rows.len(),
             Response::Impulse { .. } => self.touching,
         };
         match self.settings.integrator {
@@ -57,6 +57,9 @@ impl Manipulation {
             *spare_j -= self.roster.owed_j[body];
         }
         let end = End { rows: &self.rows, motions: &self.motions, entities, dt_s };
+        for at in 0..self.pairs.awake_count() {
+            self.pairs.awake_at(at).1.take_impulses(&end, &mut self.spare_j);
+        }
         for at in 0..self.pairs.awake_count() {
             let has_met = |row| self.restitution.has_met(row);
             self.pairs.awake_at(at).1.settle(&end, has_met, &mut self.spare_j);

@@ -45,13 +45,13 @@ impl Manipulation {
         self.stand_still(body, &mut entities[entity]);
         self.roster.set(body, Standing::Awake);
         self.parked.retain(|parked| parked.entity != entity);
-        let who = who(&self.roster, entities, self.settings.response);
+        let who = who(&self.roster, entities, self.contacts);
         self.pairs.follow(body, &who, &self.broad_phase, true);
     }
 
     /// Takes note that the friction of an entity is another one: who lies on it, or it itself, wakes.
     pub fn has_other_friction(&mut self, entity: usize, entities: &[Entity]) {
-        let who = who(&self.roster, entities, self.settings.response);
+        let who = who(&self.roster, entities, self.contacts);
         self.pairs.resurface(entity, &who);
         self.neighbours.clear();
         for (key, _) in self.pairs.iter().filter(|(_, pair)| pair.entities.contains(&entity)) {

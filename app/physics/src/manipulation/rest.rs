@@ -17,7 +17,7 @@ impl Manipulation {
         while self.roster.standing(next) == Standing::Asleep {
             let after = self.roster.next(next);
             self.roster.set(next, Standing::Awake);
-            let who = who(&self.roster, entities, self.settings.response);
+            let who = who(&self.roster, entities, self.contacts);
             self.pairs.wake(next, &who, &self.broad_phase);
             next = after;
         }
@@ -108,7 +108,7 @@ impl Manipulation {
                 }
             }
         }
-        let who = who(&self.roster, entities, self.settings.response);
+        let who = who(&self.roster, entities, self.contacts);
         self.pairs.put_to_sleep(|body| self.roster.standing(body) == Standing::Awake, &who);
     }
 

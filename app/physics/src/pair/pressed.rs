@@ -11,7 +11,7 @@ use crate::collide::ContactPoint;
 use crate::row::{Row, Torsion};
 use crate::solver::Motion;
 
-/// The row of a point.
+/// The row of a point; and the damping along its normal that stops what it presses \[N s/m\].
 pub(super) fn row(
     (body, other): (usize, Option<usize>),
     surfacing: &Surfacing,
@@ -19,7 +19,7 @@ pub(super) fn row(
     point: &ContactPoint,
     X_WB: &Isometry3<f64>,
     start: &Start<'_>,
-) -> Row {
+) -> (Row, f64) {
     let dt_s = start.dt_s;
     let arm = |body: usize, side: usize| {
         let arm_W = point.point_W - start.bodies[body].centre_W;
@@ -35,7 +35,7 @@ pub(super) fn row(
         arms_W[0] -= apart_W * 0.5;
         arms_W[1] += apart_W * 0.5;
     }
-    let (k, b) = (surfacing.stiffness_n_per_m, surfacing.damping_n_s_per_m);
+    let k = surfacing.stiffness_n_per_m;
     let gap_m = -anchor.pressed_m;
     let n = point.normal_W;
     let mut row = Row {
@@ -45,7 +45,7 @@ pub(super) fn row(
         normal_W: n,
         rest_W: Vector3::zeros(),
         stiffness: [k * anchor.share, k],
-        damping: [b; 2],
+        damping: [0.0; 2],
         mu_hold: surfacing.friction.mu_hold,
         mu_slide: surfacing.friction.mu_slide,
         held: anchor.held(),
@@ -53,27 +53,31 @@ pub(super) fn row(
         torsion: Torsion::default(),
         tie_n: None,
     };
+    let gives_per_kg = gives_per_kg(&row, start);
+    row.damping = row.stiffness.map(|k| surfacing.damping.n_s_per_m(k, gives_per_kg));
+    let [b, b_across] = row.damping;
+    // So large that velocities are what is wanted. Nothing can be stopped that nothing moves.
+    let stop = if gives_per_kg > 0.0 { HARD / (gives_per_kg * dt_s) } else { 0.0 };
     let rest_n = match surfacing.response {
         //= melder#6.2
-        Response::Force if gap_m < 0.0 => -row.stiffness[0] * gap_m,
+        Response::Force | Response::Bounce { .. } if gap_m < 0.0 => -row.stiffness[0] * gap_m,
         // Of a force that is known when the tick begins nothing is damped before they meet.
-        Response::Force if !start.is_implicit => {
+        Response::Force | Response::Bounce { .. } if !start.is_implicit => {
             row.damping[0] = 0.0;
             -row.stiffness[0] * gap_m
         }
         // Only what is left of the tick when they meet is damped.
-        Response::Force => {
+        Response::Force | Response::Bounce { .. } => {
             (row.stiffness[0], row.damping[0]) = (row.stiffness[0] + b / dt_s, 0.0);
             -row.stiffness[0] * gap_m
         }
         Response::Impulse { .. } => {
-            let stop = stop_n_s_per_m(&row, start);
-            (row.stiffness, row.damping) = ([0.0, k], [stop, b]);
+            (row.stiffness, row.damping) = ([0.0, k], [stop, b_across]);
             stop * if gap_m < 0.0 { let_out_m_s(-gap_m, dt_s) } else { -gap_m / dt_s }
         }
     };
     row.rest_W = n * rest_n - anchor.stretch_W(X_WB) * row.stiffness[1];
-    row
+    (row, stop)
 }
 
 /// How far a body turns in half a tick, if nothing touches it.
@@ -83,20 +87,18 @@ fn middle_W(motion: &Motion, dt_s: f64) -> UnitQuaternion<f64> {
     UnitQuaternion::from_scaled_axis(if turn_W.norm_squared() < 0.25 { turn_W } else { Vector3::zeros() })
 }
 
-/// A damping so large that velocities are what is wanted.
-fn stop_n_s_per_m(row: &Row, start: &Start<'_>) -> f64 {
+/// How fast the two give way along the normal, per impulse.
+fn gives_per_kg(row: &Row, start: &Start<'_>) -> f64 {
     let give = |body: usize, arm_W: &Vector3<f64>| {
         let motion = &start.motions[body];
         let turns_W = arm_W.cross(&row.normal_W);
         motion.inverse_mass + turns_W.dot(&(motion.inverse_inertia_W * turns_W))
     };
-    let gives = give(row.body, &row.arms_W[0]) + row.other.map_or(0.0, |other| give(other, &row.arms_W[1]));
-    // Nothing can be stopped that nothing moves.
-    if gives > 0.0 { HARD / (gives * start.dt_s) } else { 0.0 }
+    give(row.body, &row.arms_W[0]) + row.other.map_or(0.0, |other| give(other, &row.arms_W[1]))
 }
 
 /// How fast a depth that should not be there is let out.
-pub(super) fn let_out_m_s(depth_m: f64, dt_s: f64) -> f64 {
+pub(crate) fn let_out_m_s(depth_m: f64, dt_s: f64) -> f64 {
     (depth_m / LET_OUT_S.max(dt_s)).min(LET_OUT_M_S)
 }
 

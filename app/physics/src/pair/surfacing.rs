@@ -1,7 +1,8 @@
-//! What two surfaces make of each other: stiffnesses in series, dampings added, friction the geometric mean.
+//! What two surfaces make of each other: stiffness and damping of [`Contacts`], friction the geometric mean.
 
 use haptics::Entity;
 
+use crate::contacts::{ContactDamping, Contacts};
 use crate::pair_friction::PairFriction;
 
 /// How a contact between entities answers.
@@ -10,11 +11,31 @@ pub enum Response {
     /// A spring and a damper.
     #[default]
     Force,
-    /// Velocities are reflected.
+    /// The same; but where entities meet, the approaching velocity is reflected before the spring is pressed.
+    Bounce {
+        /// e, 0 to 1: how much of the approaching velocity comes back, where neither entity says.
+        restitution: f64,
+    },
+    /// Velocities are reflected, and what rests is held without a spring.
     Impulse {
         /// e, 0 to 1: how much of the approaching velocity comes back, where neither entity says.
         restitution: f64,
     },
+}
+
+impl Response {
+    /// Whether a spring presses what rests.
+    pub(crate) fn has_springs(self) -> bool {
+        !matches!(self, Self::Impulse { .. })
+    }
+
+    /// How much of an approaching velocity comes back; `None`: what the spring and its damper leave.
+    pub(crate) fn restitution(self) -> Option<f64> {
+        match self {
+            Self::Force => None,
+            Self::Bounce { restitution } | Self::Impulse { restitution } => Some(restitution),
+        }
+    }
 }
 
 /// What two surfaces make of each other.
@@ -22,8 +43,8 @@ pub enum Response {
 pub struct Surfacing {
     /// Of each contact point \[N/m\].
     pub stiffness_n_per_m: f64,
-    /// Of each contact point \[N s/m\].
-    pub damping_n_s_per_m: f64,
+    /// Of each contact point.
+    pub damping: ContactDamping,
     /// Ratios.
     pub friction: PairFriction,
     /// How it answers.
@@ -31,14 +52,25 @@ pub struct Surfacing {
 }
 
 impl Surfacing {
+    /// Things that rest on each other are no deeper \[m\]: what is found deeper was placed there, and its spring would throw it.
+    pub(crate) fn deepest_rest_m(&self) -> f64 {
+        match self.damping {
+            ContactDamping::Constant(_) => f64::INFINITY,
+            ContactDamping::Ratio(_) => DEEPEST_REST_M,
+        }
+    }
+
     /// Of two entities.
-    pub fn between(a: &Entity, b: &Entity, response: Response) -> Self {
-        let (k_a, k_b) = (a.stiffness_n_per_m, b.stiffness_n_per_m);
+    pub fn between(a: &Entity, b: &Entity, contacts: &Contacts) -> Self {
+        let (stiffness_n_per_m, damping) = contacts.between(a, b);
         Self {
-            stiffness_n_per_m: k_a / (1.0 + k_a / k_b),
-            damping_n_s_per_m: a.damping_n_s_per_m + b.damping_n_s_per_m,
+            stiffness_n_per_m,
+            damping,
             friction: PairFriction::between(&a.friction, &b.friction),
-            response: response.between(a, b),
+            response: contacts.response(a, b),
         }
     }
 }
+
+/// Ten times what the heaviest rests at on one point \[m\].
+const DEEPEST_REST_M: f64 = 2.5e-5;

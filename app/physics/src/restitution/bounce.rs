@@ -47,8 +47,8 @@ impl Impulses<'_> {
 }
 
 /// What of a force is an impulse's: not what springs across the normal of a contact that stays do.
-fn impulse_W(row: &Row, force_W: &Vector3<f64>) -> Vector3<f64> {
-    let is_impulse = row.stiffness[1] >= row.damping[0];
+fn impulse_W(row: &Row, force_W: &Vector3<f64>, dt_s: f64) -> Vector3<f64> {
+    let is_impulse = row.stiffness[1] == row.damping[0] / dt_s;
     if is_impulse { *force_W } else { row.normal_W * row.normal_W.dot(force_W) }
 }
 
@@ -101,7 +101,7 @@ impl Bounce {
         self.shares.resize(motions.len(), 0.0);
         for at in impulses.all() {
             let row = &rows[at];
-            let work = impulse_W(row, &row.force_W).dot(&(self.before_W(row) + velocity(row, motions)));
+            let work = impulse_W(row, &row.force_W, dt_s).dot(&(self.before_W(row) + velocity(row, motions)));
             self.shares[row.body] += work;
             if let Some(other) = row.other {
                 self.shares[other] += work;
@@ -132,8 +132,8 @@ impl Bounce {
             let (mut a, mut b, mut c) = (-self.free_w(&motions[body], dt_s), 0.0, 0.0);
             for at in impulses.all().filter(|&at| rows[at].body == body || rows[at].other == Some(body)) {
                 let row = &rows[at];
-                let f_0 = impulse_W(row, &row.force_W);
-                let f = impulse_W(row, &self.forces[at].0) - f_0;
+                let f_0 = impulse_W(row, &row.force_W, dt_s);
+                let f = impulse_W(row, &self.forces[at].0, dt_s) - f_0;
                 let u_0 = self.before_W(row) + velocity(row, motions);
                 let u = velocity(row, &self.bouncing) - velocity(row, motions);
                 a += f_0.dot(&u_0);

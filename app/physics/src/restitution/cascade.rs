@@ -78,7 +78,7 @@ impl Cascade {
             self.meet(two, meetings, rows, motions, dt_s);
         }
         for meeting in meetings.iter().filter(|meeting| self.has_met(meeting.row)) {
-            meeting.reflect(&mut rows[meeting.row], 0.0, dt_s);
+            meeting.stop(&mut rows[meeting.row], dt_s);
         }
     }
 
@@ -128,15 +128,14 @@ impl Cascade {
             meetings.iter().filter(|meeting| is_of(&rows[meeting.row], body, other)).take(MAX_POINTS)
         {
             let was = &rows[meeting.row];
-            let (n, stop_n_s_per_m) = (was.normal_W, was.damping[0]);
+            let n = was.normal_W;
             let mut row = Row { body: 0, other: other.map(|_| 1), force_W: Vector3::zeros(), ..*was };
             row.torsion = Torsion::default();
-            row.rest_W = n * (stop_n_s_per_m * (-meeting.gap_m / dt_s));
             let leaves_m_s = meeting.leaves_m_s(dt_s);
             // What is stopped gives way by a part in so many: that much more is asked for.
             let freely_m_s = n.dot(&velocity(was, motions));
             let more = |m_s: f64| m_s + (m_s - freely_m_s) / HARD;
-            meeting.reflect(&mut row, leaves_m_s.map_or(0.0, more), dt_s);
+            meeting.reflect(&mut row, leaves_m_s.map_or(-meeting.gap_m / dt_s, more), dt_s);
             let kind = if leaves_m_s.is_some() { &mut self.impacts } else { &mut self.stops };
             kind.push(self.rows.len());
             self.rows.push(row);

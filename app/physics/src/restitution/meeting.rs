@@ -1,8 +1,10 @@
 //! A contact point that answers by an impulse, and whether it meets what it touches within the tick.
 //!
-//! Model: the velocity that it leaves with is the reflected one of the beginning of the tick, less what gravity takes from it in
-//! the whole tick: so a ball that does not lose anything else loses `(g dt)^2 / 2` of energy per mass in each bounce, and never
-//! gains. What approaches no faster than gravity makes it in a tick rests, and a bounce that gravity would end
+//! Model: within a tick a body goes on with one velocity, so that it cannot come down to where they touch and leave from there.
+//! It leaves from where it is, with the velocity at which it has what restitution leaves of the energy that it would meet
+//! with: of a bounce under gravity, `v_1^2 / 2 + g (h + v_1 dt) = e^2 (v_0^2 / 2 + g h)`, h above the ground. So bounces keep `e^2`
+//! of their energy at any rate. What bounces no higher than it is has to come down first: it stops where they touch, and
+//! leaves in the next tick as fast as it would have met. What approaches no faster than gravity makes it in a tick rests, and a bounce that gravity would end
 //! within the tick is none. Nor is one that anything else ended so: a contact that closes in a tick in which it did not
 //! approach was pushed back before it got off, and rests. Of two bodies that both fall, gravity takes nothing from how they approach;
 //! yet they rest as well when they are as slow.
@@ -11,14 +13,24 @@ use nalgebra::Vector3;
 
 use super::velocity;
 use crate::anchor::Anchor;
-use crate::pair::Start;
+use crate::pair::{Start, let_out_m_s};
 use crate::row::Row;
 use crate::solver::Motion;
 
-/// A row of the impulse response, whose damping along the normal stops what it presses.
+/// What stops a contact point.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Stop {
+    /// Damping along the normal that stops what it presses.
+    pub(crate) n_s_per_m: f64,
+    /// Whether it holds what rests, too; else a spring does.
+    pub(crate) is_always: bool,
+}
+
+/// A row that may answer by an impulse.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Meeting {
     pub(crate) row: usize,
+    pub(super) stop: Stop,
     /// Whether other bodies are pressed beside its own: they meet one after the other.
     pub(super) is_among_many: bool,
     /// Until they touch \[m\]; below zero: how deep they are.
@@ -32,17 +44,22 @@ pub(crate) struct Meeting {
     calm_m_s: f64,
     /// It was pushed back before it got off.
     is_held: bool,
+    /// With which normal velocity it stops where they touch \[m/s\].
+    stops_m_s: f64,
+    /// How fast they met in the last tick, in which there was no room to leave \[m/s\]; 0: they did not.
+    owed_m_s: f64,
 }
 
 impl Meeting {
     /// Of the row that will have this number; remembers whether it approaches.
     pub(crate) fn of(
         (number, row): (usize, &Row),
-        gap_m: f64,
+        stop: Stop,
         restitution: f64,
         anchor: &mut Anchor,
         start: &Start<'_>,
     ) -> Self {
+        let gap_m = -anchor.pressed_m;
         let along = |velocity_W: &Vector3<f64>| row.normal_W.dot(velocity_W);
         let (now_m_s, freely_m_s) = (along(&at_start(row, start)), along(&velocity(row, start.motions)));
         let grows_m_s = freely_m_s - now_m_s;
@@ -53,8 +70,14 @@ impl Meeting {
         let approaches = now_m_s < -calm_m_s;
         let is_held = anchor.is_pressed() && !anchor.approached && approaches;
         anchor.approached = approaches;
-        Self {
+        let stops_m_s = match gap_m {
+            gap_m if gap_m > 0.0 => -gap_m / start.dt_s,
+            _ if stop.is_always => let_out_m_s(-gap_m, start.dt_s),
+            _ => 0.0,
+        };
+        let meeting = Self {
             row: number,
+            stop,
             is_among_many: false,
             gap_m,
             restitution,
@@ -62,7 +85,14 @@ impl Meeting {
             grows_m_s,
             calm_m_s,
             is_held,
+            stops_m_s,
+            // What something else has held up meanwhile meets anew.
+            owed_m_s: Some(std::mem::take(&mut anchor.owed_m_s)).filter(|_| gap_m < TOUCHES_M).unwrap_or(0.0),
+        };
+        if meeting.meets(start.dt_s) && meeting.leaves(start.dt_s) == Leaves::Later {
+            anchor.owed_m_s = meeting.meets_at_m_s(start.dt_s);
         }
+        meeting
     }
 
     pub(super) fn bounces(&self) -> bool {
@@ -77,24 +107,66 @@ impl Meeting {
     /// Whether it meets what it touches within a tick, so fast that it does not rest.
     pub(super) fn meets(&self, dt_s: f64) -> bool {
         let closes_m_s = self.approaches_m_s - self.grows_m_s;
-        !self.is_held && self.approaches_m_s > self.calm_m_s && self.gap_m < closes_m_s * dt_s
+        self.owed_m_s > 0.0
+            || !self.is_held && self.approaches_m_s > self.calm_m_s && self.gap_m < closes_m_s * dt_s
     }
 
-    /// With which normal velocity it leaves the tick if it meets what it touches; 0 and below: it stays.
+    /// With which normal velocity it leaves the tick if it meets what it touches; `None`: it stays.
     pub(super) fn leaves_m_s(&self, dt_s: f64) -> Option<f64> {
-        //= melder#6.1
-        self.meets(dt_s).then(|| self.restitution * self.approaches_m_s + self.grows_m_s.min(0.0))
+        match self.leaves(dt_s) {
+            Leaves::With(m_s) if self.meets(dt_s) => Some(m_s),
+            _ => None,
+        }
     }
 
-    /// Makes the row leave with this velocity (m/s), or stay.
-    pub(super) fn reflect(&self, row: &mut Row, leaves_m_s: f64, dt_s: f64) {
-        let n = row.normal_W;
-        let stop_n_s_per_m = row.damping[0];
-        // What an impulse gives across the normal lasts no longer than the impulse.
-        row.stiffness[1] = stop_n_s_per_m / dt_s;
-        let rest_n = if leaves_m_s > 0.0 { stop_n_s_per_m * leaves_m_s } else { n.dot(&row.rest_W) };
-        row.rest_W = n * rest_n;
+    /// Whether something stops it that is no spring.
+    pub(super) fn stops(&self, dt_s: f64) -> bool {
+        self.stop.is_always || self.meets(dt_s)
     }
+
+    /// How fast it is where they touch.
+    fn meets_at_m_s(&self, dt_s: f64) -> f64 {
+        let falls_m_s2 = -self.grows_m_s / dt_s;
+        let squared = self.approaches_m_s.powi(2) + 2.0 * falls_m_s2 * self.gap_m.max(0.0);
+        if self.owed_m_s > 0.0 { self.owed_m_s } else { squared.max(0.0).sqrt() }
+    }
+
+    fn leaves(&self, dt_s: f64) -> Leaves {
+        //= melder#6.1
+        let back_m_s = self.restitution * self.meets_at_m_s(dt_s);
+        let falls_m_s = -self.grows_m_s;
+        if back_m_s <= falls_m_s.max(0.0) {
+            return Leaves::Not;
+        }
+        let gap_m = if self.owed_m_s > 0.0 { self.gap_m } else { self.gap_m.max(0.0) };
+        let squared = back_m_s.powi(2) - 2.0 * falls_m_s / dt_s * gap_m + falls_m_s.powi(2);
+        if squared < 0.0 { Leaves::Later } else { Leaves::With(squared.sqrt() - falls_m_s) }
+    }
+
+    /// Makes the row leave with this velocity (m/s).
+    pub(super) fn reflect(&self, row: &mut Row, leaves_m_s: f64, dt_s: f64) {
+        let stop_n_s_per_m = self.stop.n_s_per_m;
+        // What an impulse gives across the normal lasts no longer than the impulse.
+        row.stiffness = [0.0, stop_n_s_per_m / dt_s];
+        row.damping[0] = stop_n_s_per_m;
+        row.rest_W = row.normal_W * (stop_n_s_per_m * leaves_m_s);
+    }
+
+    /// Makes the row stop what still comes.
+    pub(super) fn stop(&self, row: &mut Row, dt_s: f64) {
+        self.reflect(row, self.stops_m_s, dt_s);
+    }
+}
+
+/// What comes of a meeting.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Leaves {
+    /// Gravity ends the bounce within the tick.
+    Not,
+    /// With this normal velocity \[m/s\].
+    With(f64),
+    /// It bounces no higher than it is now: it has to come down first.
+    Later,
 }
 
 /// Velocity of the body's point relative to the other's when the tick begins.
@@ -106,6 +178,8 @@ fn at_start(row: &Row, start: &Start<'_>) -> Vector3<f64> {
     at(row.body, &row.arms_W[0]) - row.other.map_or(Vector3::zeros(), |other| at(other, &row.arms_W[1]))
 }
 
+/// Nearer has come down to where they touch \[m\]: what is stopped at 10 m/s is a part in a million of its tick's way short of it.
+const TOUCHES_M: f64 = 2e-8;
 /// What two bodies approach no faster with rests even without gravity \[m/s\]: what is stopped a million times harder than it
 /// moves has such a velocity left of 1 m/s.
 const CALM_M_S: f64 = 1e-6;

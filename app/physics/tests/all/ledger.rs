@@ -16,7 +16,7 @@ use haptics::{Cuboid, Entity, Shape, Sphere};
 use nalgebra::{Isometry3, Vector3};
 use noise::Noise;
 use physics::collide::{ContactPoints, PairMemory, Solid, contact_points};
-use physics::{Body, Manipulation, Response, Row, Settings, Sleep, Surfacing};
+use physics::{Body, Contacts, Manipulation, Row, Settings, Sleep, Surfacing};
 use thrown::KINDS;
 
 /// The ways in which the plates of a cage lie.
@@ -177,7 +177,7 @@ impl Cage {
         let [a, b] = [body, plate].map(|at| Solid { shape: &entities[at].shape, X_W: &entities[at].X_WB });
         let mut found = ContactPoints::default();
         contact_points(a, b, 1e-3, &mut PairMemory::default(), &mut found);
-        let k = Surfacing::between(&entities[body], &entities[plate], Response::Force).stiffness_n_per_m;
+        let k = Surfacing::between(&entities[body], &entities[plate], &Contacts::default()).stiffness_n_per_m;
         0.5 * k * found.as_slice().iter().map(|p| p.share * p.depth_m().powi(2)).sum::<f64>()
     }
 }

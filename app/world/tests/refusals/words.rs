@@ -6,12 +6,12 @@ use world::{MassSpec, Scene};
 
 use crate::{refused, with_entity, with_finger, with_shape, with_top};
 
-const SCENE_KEYS: &str = "name, gravity_m_s2, integrator, contact_response, grasp_quality, sleep, lists, hand, finger, entity, field, guide, \
+const SCENE_KEYS: &str = "name, gravity_m_s2, integrator, contact_response, contact_stiffness, grasp_quality, sleep, lists, hand, finger, entity, field, guide, \
      include, template, environment, light, camera";
 const FINGER_KEYS: &str = "name, radius_m, start_m, device, passivity, soft, attach, within";
 const ENTITY_KEYS: &str = "name, shape, position_m, orientation_wxyz, stiffness_n_per_m, damping_n_s_per_m, friction, faces, algorithm, \
                            material, shading, height_map, magnetism, vibration, movable, mass_kg, density_kg_m3, inertia_kg_m2, \
-                           centre_of_mass_m, velocity_m_s, angular_velocity_rad_s, rotation_locked, restitution, haptic, collidable, \
+                           centre_of_mass_m, velocity_m_s, angular_velocity_rad_s, rotation_locked, restitution, contact_stiffness_n_per_m, haptic, collidable, \
                            visual, template, grid, within";
 
 #[test]
@@ -162,22 +162,52 @@ fn what_only_an_entity_that_moves_can_have_is_refused_without_a_mass() {
 }
 
 #[test]
-fn a_restitution_that_is_no_share_or_that_nobody_asks_for_is_refused() {
-    let impulse = "contact_response = { kind = \"impulse\" }\n";
-    let scene = |top: &str, restitution: &str| {
-        format!("{top}{}", with_entity(&format!("restitution = {restitution}")))
-    };
+fn a_restitution_that_is_no_share_is_refused() {
     for (restitution, allowed) in [("1.5", "a number from 0 to 1"), ("-0.1", "a number, 0 or more")] {
-        let message = format!("s.toml:9: entity[0].restitution: found {restitution}; allowed: {allowed}");
-        refused(&scene(impulse, restitution), &message);
+        let entity = format!("s.toml:8: entity[0].restitution: found {restitution}; allowed: {allowed}");
+        refused(&with_entity(&format!("restitution = {restitution}")), &entity);
+        for kind in ["force", "impulse"] {
+            let scene =
+                format!("s.toml:1: contact_response.restitution: found {restitution}; allowed: {allowed}");
+            let response =
+                format!("contact_response = {{ kind = \"{kind}\", restitution = {restitution} }}\n");
+            refused(&format!("{response}{}", with_entity("")), &scene);
+        }
     }
-    refused(
-        &scene("", "0.5"),
-        "s.toml:8: entity[0].restitution: found 0.5; allowed: none while contacts are springs with dampers: say \
-         `contact_response = { kind = \"impulse\" }` at the top of the scene, or leave out `restitution`",
-    );
-    let read = Scene::parse(&scene(impulse, "0.5"), Path::new("s.toml")).unwrap();
+    let read = Scene::parse(&with_entity("restitution = 0.5"), Path::new("s.toml")).unwrap();
     assert_eq!(read.entities[0].restitution, Some(0.5));
+}
+
+#[test]
+fn a_contact_stiffness_that_is_none_or_does_not_fit_its_kind_is_refused() {
+    let scene = |stiffness: &str| format!("contact_stiffness = {stiffness}\n{}", with_entity(""));
+    for (stiffness, message) in [
+        (
+            "{ kind = \"hard\" }",
+            "s.toml:1: contact_stiffness.kind: unknown contact stiffness \"hard\"; allowed: by-mass, as-felt, given",
+        ),
+        (
+            "{ kind = \"given\", stiffness_n_per_m = 0 }",
+            "s.toml:1: contact_stiffness.stiffness_n_per_m: found 0; allowed: a number above 0",
+        ),
+        (
+            "{ kind = \"by-mass\", stiffness_n_per_m = 1e5 }",
+            "s.toml:1: contact_stiffness.stiffness_n_per_m: found 100000; allowed: none, but with kind = \"given\"",
+        ),
+        (
+            "{ kind = \"as-felt\", damping_ratio = 1.0 }",
+            "s.toml:1: contact_stiffness.damping_ratio: found 1; allowed: none with kind = \"as-felt\": dampers are the entities' own",
+        ),
+    ] {
+        refused(&scene(stiffness), message);
+    }
+    let read =
+        |stiffness: &str| Scene::parse(&scene(stiffness), Path::new("s.toml")).unwrap().dynamics.stiffness;
+    use world::ContactStiffnessSpec::{AsFelt, ByMass, Given};
+    assert_eq!(read("{ kind = \"as-felt\" }"), AsFelt);
+    assert_eq!(read("{ kind = \"by-mass\", damping_ratio = 0.5 }"), ByMass { damping_ratio: 0.5 });
+    let given = Given { stiffness_n_per_m: 2e4, damping_ratio: 1.0 };
+    assert_eq!(read("{ kind = \"given\", stiffness_n_per_m = 2e4 }"), given);
 }
 
 #[test]

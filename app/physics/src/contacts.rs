@@ -1,0 +1,176 @@
+//! How stiff and how damped contacts between entities are.
+//!
+//! Problem: what fingers feel is soft, for a hand stands a few newtons per millimetre at best. On a shelf of that stiffness a
+//! ball of steel sinks out of sight.
+//! Model: contacts between entities have a stiffness of their own, `k = m (2000 / s)^2` of each point, with m the mass of the
+//! heaviest body: on a single point that rests 2.5 um deep, whatever the rate, and what carries forty of its like a tenth
+//! of a millimetre. They have a damper of their own, a share of the critical one of what gives way at the point: nothing
+//! swings, whatever it weighs. An entity may say another stiffness; two that do are one spring behind the other.
+//! Since forces are those of the end of the tick, no stiffness is too large for a light body. Of integrators that take
+//! those of its beginning this is not so: there contacts are as felt (Melder ch. 6.2.2.2), one surface behind the other, with
+//! both dampers.
+
+use haptics::Entity;
+
+use crate::pair::Response;
+
+/// How stiff contacts between entities are that do not say it themselves.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub enum ContactStiffness {
+    /// As fingers feel both surfaces, with both entities' dampers.
+    #[default]
+    AsFelt,
+    /// By the mass of the heaviest body.
+    ByMass {
+        /// Of the damper to the critical one.
+        damping_ratio: f64,
+    },
+    /// The same for all.
+    Given {
+        /// Of each contact point \[N/m\], > 0.
+        stiffness_n_per_m: f64,
+        /// Of the damper to the critical one.
+        damping_ratio: f64,
+    },
+}
+
+/// How contacts between entities answer, and how stiff they are.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Contacts {
+    /// How they answer.
+    pub response: Response,
+    /// Whether nothing is reflected that a spring presses: of an integrator that knows its forces when the tick begins.
+    pub springs_only: bool,
+    /// Of points between entities that do not say it themselves: stiffness \[N/m\] and damping ratio. `None`: as felt.
+    own: Option<(f64, f64)>,
+}
+
+/// What is damped at a contact point.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum ContactDamping {
+    /// \[N s/m\]
+    Constant(f64),
+    /// A share of the critical damping of what gives way at the point.
+    Ratio(f64),
+}
+
+impl Default for ContactDamping {
+    fn default() -> Self {
+        Self::Constant(0.0)
+    }
+}
+
+impl Contacts {
+    /// Among bodies of which the heaviest has this mass (kg).
+    pub fn among(response: Response, stiffness: ContactStiffness, heaviest_kg: f64) -> Self {
+        let own = match stiffness {
+            ContactStiffness::AsFelt => None,
+            ContactStiffness::ByMass { damping_ratio } => {
+                Some((heaviest_kg * SWINGS_RAD_S * SWINGS_RAD_S, damping_ratio))
+            }
+            ContactStiffness::Given { stiffness_n_per_m, damping_ratio } => {
+                Some((stiffness_n_per_m, damping_ratio))
+            }
+        };
+        Self { response, springs_only: false, own: own.filter(|(stiffness, _)| *stiffness > 0.0) }
+    }
+
+    /// How a contact between two entities answers. Of a stiffness that is no finger's what meets stops, if nobody says otherwise.
+    pub fn response(&self, a: &Entity, b: &Entity) -> Response {
+        match self.response.between(a, b) {
+            Response::Bounce { .. } if self.springs_only => Response::Force,
+            // No damper would do that: a spring that may not pull gives back an eighth of what it stops.
+            Response::Force if self.own.is_some() => Response::Bounce { restitution: 0.0 },
+            response => response,
+        }
+    }
+
+    /// Stiffness of a contact point between two entities \[N/m\], and its damping.
+    pub fn between(&self, a: &Entity, b: &Entity) -> (f64, ContactDamping) {
+        let own = [a, b].map(|entity| entity.contact_stiffness_n_per_m);
+        match (self.own, own) {
+            (None, [None, None]) => {
+                let damping_n_s_per_m = a.damping_n_s_per_m + b.damping_n_s_per_m;
+                let stiffness_n_per_m = in_series(a.stiffness_n_per_m, b.stiffness_n_per_m);
+                (stiffness_n_per_m, ContactDamping::Constant(damping_n_s_per_m))
+            }
+            (None, [of_a, of_b]) => {
+                let [of_a, of_b] = [of_a.unwrap_or(a.stiffness_n_per_m), of_b.unwrap_or(b.stiffness_n_per_m)];
+                (in_series(of_a, of_b), ContactDamping::Ratio(1.0))
+            }
+            (Some((stiffness_n_per_m, damping_ratio)), own) => {
+                let stiffness_n_per_m = match own {
+                    [Some(of_a), Some(of_b)] => in_series(of_a, of_b),
+                    [one, other] => one.or(other).unwrap_or(stiffness_n_per_m),
+                };
+                (stiffness_n_per_m, ContactDamping::Ratio(damping_ratio))
+            }
+        }
+    }
+}
+
+impl ContactDamping {
+    /// Coefficient at a point of this stiffness (N/m) where the two give way with a velocity per impulse of so much
+    /// (1/kg) \[N s/m\].
+    #[inline]
+    pub(crate) fn n_s_per_m(self, stiffness_n_per_m: f64, gives_per_kg: f64) -> f64 {
+        match self {
+            Self::Constant(damping_n_s_per_m) => damping_n_s_per_m,
+            Self::Ratio(ratio) if gives_per_kg > 0.0 => {
+                2.0 * ratio * (stiffness_n_per_m / gives_per_kg).sqrt()
+            }
+            // Nothing moves there.
+            Self::Ratio(_) => 0.0,
+        }
+    }
+}
+
+fn in_series(a: f64, b: f64) -> f64 {
+    a / (1.0 + a / b)
+}
+
+/// The heaviest body swings as fast on a single undamped point.
+const SWINGS_RAD_S: f64 = 2000.0;
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use haptics::Sphere;
+    use nalgebra::Isometry3;
+
+    fn entity(stiffness_n_per_m: f64) -> Entity {
+        Entity::new(Sphere::new(0.02).unwrap(), Isometry3::identity(), stiffness_n_per_m).unwrap()
+    }
+
+    #[test]
+    fn entities_that_say_their_stiffness_have_it_and_all_others_what_the_scene_or_the_heaviest_says() {
+        let (soft, hard) = (entity(500.0), entity(1500.0));
+        let says = |entity: &Entity, k| entity.clone().with_contact_stiffness(k).unwrap();
+        let felt = Contacts::among(Response::Force, ContactStiffness::AsFelt, 2.0);
+        let by_mass = Contacts::among(Response::Force, ContactStiffness::ByMass { damping_ratio: 0.5 }, 2.0);
+        let given = ContactStiffness::Given { stiffness_n_per_m: 1e5, damping_ratio: 1.0 };
+        let given = Contacts::among(Response::Force, given, 2.0);
+        let (constant, ratio) = (ContactDamping::Constant, ContactDamping::Ratio);
+        // Roundings of sums of reciprocals.
+        let near = |(k, damping): (f64, ContactDamping), expected: f64, damped| {
+            assert!((k / expected - 1.0).abs() < 1e-15 && damping == damped, "{k} {expected} {damping:?}");
+        };
+        near(felt.between(&soft, &hard), 375.0, constant(0.0));
+        near(by_mass.between(&soft, &hard), 8e6, ratio(0.5));
+        near(given.between(&soft, &hard), 1e5, ratio(1.0));
+        near(by_mass.between(&says(&soft, 4e3), &hard), 4e3, ratio(0.5));
+        near(by_mass.between(&says(&soft, 4e3), &says(&hard, 12e3)), 3e3, ratio(0.5));
+        near(felt.between(&soft, &says(&hard, 500.0)), 250.0, ratio(1.0));
+        // Nothing that moves: nothing that could be pressed either.
+        let none = Contacts::among(Response::Force, ContactStiffness::ByMass { damping_ratio: 1.0 }, 0.0);
+        near(none.between(&soft, &hard), 375.0, constant(0.0));
+    }
+
+    #[test]
+    fn a_ratio_of_one_is_the_critical_damper() {
+        // b = 2 sqrt(k m), 2 kg on 800 N/m.
+        assert_eq!(ContactDamping::Ratio(1.0).n_s_per_m(800.0, 0.5), 80.0);
+        assert_eq!(ContactDamping::Ratio(1.0).n_s_per_m(800.0, 0.0), 0.0);
+        assert_eq!(ContactDamping::Constant(3.0).n_s_per_m(800.0, 0.5), 3.0);
+    }
+}

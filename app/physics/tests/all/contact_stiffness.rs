@@ -1,0 +1,160 @@
+//! Contacts between entities whose stiffness is their own: how deep things rest, and how they come to it, at any rate.
+#![allow(non_snake_case)]
+
+use crate::common;
+
+use common::{G, body, floor, object};
+use haptics::{Cuboid, Entity, Sphere};
+use nalgebra::Isometry3;
+use physics::{Body, ContactStiffness, Manipulation, Settings};
+
+const BY_MASS: ContactStiffness = ContactStiffness::ByMass { damping_ratio: 1.0 };
+/// [rad/s]: as the heaviest body would swing.
+const OMEGA: f64 = 2000.0;
+const RATES_HZ: [f64; 4] = [500.0, 1000.0, 4000.0, 8000.0];
+
+fn settings(contact_stiffness: ContactStiffness) -> Settings {
+    Settings { contact_stiffness, ..Settings::default() }
+}
+
+/// Things on a floor, all of them as soft for fingers as things are.
+struct Table {
+    entities: Vec<Entity>,
+    manipulation: Manipulation,
+    dt_s: f64,
+}
+
+impl Table {
+    fn new(things: Vec<(Entity, f64)>, settings: Settings, rate_hz: f64) -> Self {
+        let mut entities = vec![floor(0.0, 1000.0, 0.5)];
+        let mut bodies = Vec::new();
+        for (entity, mass_kg) in things {
+            bodies.push((entities.len(), body(&entity, mass_kg)));
+            entities.push(entity);
+        }
+        let manipulation = Manipulation::new(&entities, &bodies, settings).unwrap();
+        Self { entities, manipulation, dt_s: rate_hz.recip() }
+    }
+
+    fn run(&mut self, seconds: f64) {
+        for _ in 0..(seconds / self.dt_s).round() as u32 {
+            let made = self.manipulation.step(&mut self.entities, &mut [], self.dt_s);
+            assert_eq!(made.unsolved, 0);
+        }
+    }
+
+    fn body(&self, index: usize) -> &Body {
+        &self.manipulation.bodies()[index]
+    }
+}
+
+fn ball(radius_m: f64, height_m: f64) -> Entity {
+    object(Sphere::new(radius_m).unwrap(), Isometry3::translation(0.0, height_m, 0.0), 1000.0, 0.5)
+}
+
+fn cube(edge_m: f64, middle_m: f64) -> Entity {
+    object(Cuboid::new([edge_m; 3]).unwrap(), Isometry3::translation(0.0, middle_m, 0.0), 1000.0, 0.5)
+}
+
+#[test]
+fn whatever_it_weighs_the_heaviest_rests_on_a_point_as_deep_as_gravity_over_a_square() {
+    for rate_hz in RATES_HZ {
+        for mass_kg in [1e-4, 0.1, 20.0] {
+            let mut table = Table::new(vec![(ball(0.02, 0.03), mass_kg)], settings(BY_MASS), rate_hz);
+            table.run(2.0);
+            let depth_m = 0.02 - table.body(0).centre_W.y;
+            let speed_m_s = table.body(0).velocity_W.norm();
+            // Roundings of numbers of 0.02 m.
+            assert!((depth_m - G / OMEGA.powi(2)).abs() < 1e-15, "{rate_hz} {mass_kg}: {depth_m}");
+            assert!(speed_m_s < 1e-12, "{rate_hz} {mass_kg}: {speed_m_s}");
+        }
+    }
+}
+
+#[test]
+fn what_is_light_beside_what_is_heavy_rests_less_deep_and_carries_it() {
+    for (light_kg, heavy_kg) in [(0.05, 0.5), (0.01, 1.0), (0.001, 20.0)] {
+        for rate_hz in RATES_HZ {
+            let things = vec![(cube(0.02, 0.01), light_kg), (cube(0.02, 0.03), heavy_kg)];
+            let mut table = Table::new(things, settings(BY_MASS), rate_hz);
+            table.run(3.0);
+            // Four corners each: springs that share the load.
+            let k = 4.0 * heavy_kg * OMEGA.powi(2);
+            let below_m = (light_kg + heavy_kg) * G / k;
+            let above_m = below_m + heavy_kg * G / k;
+            let found = [0.01 - table.body(0).centre_W.y, 0.03 - table.body(1).centre_W.y];
+            for (found_m, depth_m) in found.into_iter().zip([below_m, above_m]) {
+                // They fell into each other: where nobody has worked for all of a depth (`pair/ledger.rs`), it is a little more.
+                assert!(
+                    (found_m - depth_m).abs() < 0.01 * depth_m,
+                    "{light_kg} {heavy_kg} {rate_hz}: {found:?}"
+                );
+            }
+        }
+    }
+}
+
+/// Critically damped, nothing comes back; the speed of a fall of 1 mm is gone in a few swings' time.
+#[test]
+fn what_lands_comes_to_rest_without_a_swing() {
+    for rate_hz in RATES_HZ {
+        for mass_kg in [0.01, 20.0] {
+            let mut table = Table::new(vec![(ball(0.02, 0.021), mass_kg)], settings(BY_MASS), rate_hz);
+            // It falls for 14.3 ms.
+            table.run(0.03);
+            let rest_m = 0.02 - G / OMEGA.powi(2);
+            for _ in 0..100 {
+                table.run(1.0 / rate_hz);
+                let (at_m, speed_m_s) = (table.body(0).centre_W.y, table.body(0).velocity_W.y);
+                // exp(-2000 * 15.7 ms) of 0.14 m/s, and a tick's share; never above where it rests.
+                assert!(speed_m_s.abs() < 1e-6 && at_m < rest_m + 1e-9, "{rate_hz} {at_m} {speed_m_s}");
+            }
+        }
+    }
+}
+
+#[test]
+fn entities_and_scenes_that_say_a_stiffness_have_it() {
+    let given = |k| ContactStiffness::Given { stiffness_n_per_m: k, damping_ratio: 1.0 };
+    let soft = ball(0.02, 0.02).with_contact_stiffness(2e3).unwrap();
+    let two = [(soft, BY_MASS, 2e3), (ball(0.02, 0.02), given(1e4), 1e4)];
+    for (ball, stiffness, k) in two {
+        for rate_hz in RATES_HZ {
+            let mut table = Table::new(vec![(ball.clone(), 0.1)], settings(stiffness), rate_hz);
+            table.run(2.0);
+            let depth_m = 0.02 - table.body(0).centre_W.y;
+            assert!((depth_m - 0.1 * G / k).abs() < 1e-15, "{rate_hz} {k}: {depth_m}");
+        }
+    }
+}
+
+/// An integrator that takes the forces of a tick's beginning would throw a light body off a spring for a heavy one.
+#[test]
+fn of_an_integrator_that_is_not_implicit_contacts_are_as_felt() {
+    use physics::Integrator::{Rk4, ThesisEuler};
+    for integrator in [Rk4, ThesisEuler] {
+        let settings = Settings { integrator, ..settings(BY_MASS) };
+        let things = vec![(ball(0.02, 0.02), 0.1)];
+        let mut table = Table::new(things, settings, 1000.0);
+        table.run(5.0);
+        // Two surfaces of 1000 N/m.
+        let depth_m = 0.02 - table.body(0).centre_W.y;
+        assert!((depth_m - 0.1 * G / 500.0).abs() < 1e-6, "{integrator:?}: {depth_m}");
+    }
+}
+
+#[test]
+fn a_tower_of_forty_stands_and_sinks_by_a_sum() {
+    const EDGE_M: f64 = 0.02;
+    let things = (0..40).map(|place| (cube(EDGE_M, EDGE_M * (f64::from(place) + 0.5)), 0.1)).collect();
+    let mut table = Table::new(things, settings(BY_MASS), 1000.0);
+    table.run(5.0);
+    let one_m = G / (4.0 * OMEGA.powi(2));
+    let mut sunk_m = 0.0;
+    for place in 0..40 {
+        sunk_m += one_m * f64::from(40 - place);
+        let found_m = EDGE_M * (f64::from(place) + 0.5) - table.body(place as usize).centre_W.y;
+        // Sixty of its slowest swings, critically damped, and roundings of numbers near 1.
+        assert!((found_m - sunk_m).abs() < 1e-9, "{place}: {found_m} {sunk_m}");
+    }
+}
