@@ -194,17 +194,11 @@ impl Recipient for Desk<'_> {
             }
             ServerEvent::EmergencyStopRequested { pid, user, .. } => {
                 // As of now: who asked before to leave a fault did not know of it, whatever the clock of who stops says.
-                // Whoever asks a thousand times fills no log.
-                if self.sender.urgent.stop(user, monotonic_ns()) {
-                    say(
-                        self.options,
-                        format_args!(
-                            "emergency stop, asked for by {} of {}",
-                            ProcessWords(pid),
-                            UserWords(user)
-                        ),
-                    );
-                }
+                self.sender.urgent.stop(user, monotonic_ns());
+                say(
+                    self.options,
+                    format_args!("emergency stop, asked for by {} of {}", ProcessWords(pid), UserWords(user)),
+                );
             }
             ServerEvent::ZeroRequested { pid, devices, .. } => {
                 self.post(Letter::Zero(DeviceSet(devices)))?;

@@ -75,15 +75,17 @@ impl Restitution {
                     meeting.reflect(row, leaves_m_s, dt_s);
                     impacts.push(meeting.row);
                 }
-                None if meeting.stops(dt_s) => {
+                None => {
                     let in_order = meeting.is_among_many && meeting.bounces();
-                    if !in_order && meeting.meets(dt_s) {
+                    let is_stopped = !in_order && meeting.meets(dt_s);
+                    if is_stopped {
                         meeting.stop(row, dt_s);
                     }
-                    stops.push(meeting.row);
+                    // Else its spring presses.
+                    if is_stopped || meeting.stop.is_always {
+                        stops.push(meeting.row);
+                    }
                 }
-                // Its spring presses.
-                None => {}
             }
         }
         cascade.run(meetings, rows, motions, dt_s);

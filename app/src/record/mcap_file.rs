@@ -503,24 +503,14 @@ impl WholeWrites {
 
     /// Writes all of it, or none that stays.
     fn write_whole(&mut self, bytes: &[u8]) -> io::Result<()> {
-        let mut done = 0;
-        let written = loop {
-            if done == bytes.len() {
-                break Ok(());
-            }
-            match self.file.file().write(&bytes[done..]) {
-                Ok(0) => break Err(io::ErrorKind::WriteZero.into()),
-                Ok(more) => done += more,
-                Err(error) if error.kind() == io::ErrorKind::Interrupted => {}
-                Err(error) => break Err(error),
-            }
+        let written = if self.file.has_content() {
+            self.file.replace_content(bytes)
+        } else {
+            self.file.file().write_all(bytes)
         };
-        if done > 0 {
-            self.beginning.has_content.store(false, Ordering::Relaxed);
-            self.file.give_up_content(done as u64)?;
-        }
+        self.beginning.has_content.store(self.file.has_content(), Ordering::Relaxed);
         written?;
-        self.written_bytes += done as u64;
+        self.written_bytes += bytes.len() as u64;
         Ok(())
     }
 

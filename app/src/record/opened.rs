@@ -6,8 +6,9 @@
 //! whom they want write there. A file with content keeps it until its first piece with a row is written, for which room
 //! is reserved then ([`Opened::start`]); that its beginning alone will fit is found out before the run
 //! ([`Opened::reserve`]). The piece is written over the content, in whose room and the reserved one it lies: also on a disk
-//! that others fill meanwhile. File systems that copy what is written over (btrfs) reserve no room for that, and refuse the
-//! piece itself: so the rest of the content is cut off behind it, and not before. Any other file begins at once.
+//! that others fill meanwhile. File systems that copy what is written over (btrfs) reserve no room for that, and may refuse the
+//! piece itself: so the rest of the content is cut off behind it and not before, and what was written over is put back if
+//! either is refused. Any other file begins at once.
 //! Invariant: what was opened and not started is as it was: a file that was made here is removed again.
 
 use super::destination::{is_standard_output, shown};
@@ -17,8 +18,8 @@ use rustix::fs::{FallocateFlags, fallocate};
 use rustix::io::Errno;
 use rustix::termios::isatty;
 use std::fs::{File, Metadata, OpenOptions};
-use std::io;
-use std::os::fd::AsFd;
+use std::io::{self, Read, Seek, Write};
+use std::os::fd::{AsFd, AsRawFd};
 use std::os::unix::fs::{FileTypeExt, MetadataExt};
 use std::path::{Path, PathBuf};
 
@@ -166,20 +167,43 @@ impl Opened {
         Ok(())
     }
 
-    /// Gives up the content behind so many bytes, which have been written over it; the file stays from now on, whatever
-    /// becomes of it.
+    /// Writes a first piece over the content, and gives up the rest of that; the file stays from now on, whatever becomes of it.
     ///
     /// # Errors
-    /// Refusal by the system.
-    pub(super) fn give_up_content(&mut self, written_bytes: u64) -> io::Result<()> {
-        if !self.has_content() {
+    /// Refusal by the system: the file has its content as before, or if even that is refused, nothing.
+    pub(super) fn replace_content(&mut self, piece: &[u8]) -> io::Result<()> {
+        let replaced = self.contents_first(piece.len());
+        let written = (&self.file).write_all(piece).and_then(|()| self.cut(piece.len() as u64));
+        if written.is_ok() {
+            self.before = Before::Stays;
             return Ok(());
         }
-        self.before = Before::Stays;
-        if self.file.metadata()?.len() > written_bytes {
-            self.file.set_len(written_bytes)?;
+        let back = (&self.file).stream_position().and_then(|reached| {
+            if reached > 0 {
+                (&self.file).rewind()?;
+                (&self.file).write_all(&replaced?)?;
+                (&self.file).rewind()?;
+            }
+            Ok(())
+        });
+        if back.is_err() {
+            self.before = Before::Stays;
+            self.cut(0)?;
         }
-        Ok(())
+        written
+    }
+
+    /// So many bytes of the content, or all of it if that is less.
+    fn contents_first(&self, bytes: usize) -> io::Result<Vec<u8>> {
+        // It was opened for writing alone.
+        let file = File::open(format!("/proc/self/fd/{}", self.file.as_raw_fd()))?;
+        let mut first = Vec::new();
+        file.take(bytes as u64).read_to_end(&mut first)?;
+        Ok(first)
+    }
+
+    fn cut(&self, bytes: u64) -> io::Result<()> {
+        if self.file.metadata()?.len() > bytes { self.file.set_len(bytes) } else { Ok(()) }
     }
 
     /// The file, emptied, which is kept whatever becomes of it. The standard output goes on behind what is there.
@@ -188,7 +212,8 @@ impl Opened {
     /// If the system refuses.
     pub fn empty(mut self) -> io::Result<File> {
         self.start(0)?;
-        self.give_up_content(0)?;
+        self.before = Before::Stays;
+        self.cut(0)?;
         self.file.try_clone()
     }
 
@@ -276,14 +301,13 @@ mod tests {
     #[test]
     fn a_first_piece_that_does_not_fit_after_all_leaves_the_content() {
         use rustix::fs::{MemfdFlags, SealFlags, fcntl_add_seals, memfd_create};
-        use std::io::{Read, Write};
         let flags = MemfdFlags::ALLOW_SEALING | MemfdFlags::CLOEXEC;
         let made = File::from(memfd_create("content", flags).expect("memory"));
         (&made).write_all(b"earlier rows").expect("room");
         fcntl_add_seals(&made, SealFlags::WRITE).expect("a seal");
         let read = || {
             let mut text = String::new();
-            let mut file = File::open(format!("/proc/self/fd/{}", std::os::fd::AsRawFd::as_raw_fd(&made)));
+            let mut file = File::open(format!("/proc/self/fd/{}", made.as_raw_fd()));
             file.as_mut().expect("open").read_to_string(&mut text).expect("text");
             text
         };

@@ -94,6 +94,11 @@ impl WholeLines {
         let mut done = 0;
         let bytes = self.buffer.as_bytes();
         let written = loop {
+            if self.file.has_content() {
+                let replaced = self.file.replace_content(bytes);
+                done = if replaced.is_ok() { bytes.len() } else { 0 };
+                break replaced;
+            }
             if done == bytes.len() {
                 break Ok(());
             }
@@ -104,15 +109,10 @@ impl WholeLines {
                 Err(error) => break Err(error),
             }
         };
-        let (started, mut result) = (done > 0 || written.is_ok(), written);
-        if started {
-            let cut = self.file.give_up_content(done as u64);
-            result = result.and(cut);
-            self.keep_whole_lines(done);
-        }
+        self.keep_whole_lines(done);
         self.buffer.clear();
         self.ends.clear();
-        result
+        written
     }
 
     /// It has what it had before, and nothing of what is gathered.

@@ -145,7 +145,7 @@ fn an_ordinary_users_driver_is_closed_to_the_next_ordinary_user() {
     let socket = directory.path().join("driver.sock");
     let driver = Driver::start_at(&resting("real", 1), stranger.command(&[]), directory, socket);
     let pid = driver.child.id();
-    let mut look = std::process::Command::new("setpriv");
+    let mut look = Command::new("setpriv");
     look.args(["--reuid=4711", "--regid=4711", "--clear-groups", "ls", &format!("/proc/{pid}/fd")]);
     let end = Running::start(&mut look).end();
     assert!(end.status != Some(0) && end.err.contains("Permission denied"), "{end:?}");

@@ -67,6 +67,8 @@ impl Meeting {
             let fall = |body: usize| (start.motions[body].velocity_W - start.bodies[body].velocity_W).norm();
             fall(row.body).max(fall(other)).max(CALM_M_S)
         });
+        // So slowly a spring takes it without a bounce that anybody sees; and who presses steadily comes nearer all the time.
+        let calm_m_s = if stop.is_always { calm_m_s } else { calm_m_s.max(SLOW_M_S) };
         let approaches = now_m_s < -calm_m_s;
         let is_held = anchor.is_pressed() && !anchor.approached && approaches;
         anchor.approached = approaches;
@@ -117,11 +119,6 @@ impl Meeting {
             Leaves::With(m_s) if self.meets(dt_s) => Some(m_s),
             _ => None,
         }
-    }
-
-    /// Whether something stops it that is no spring.
-    pub(super) fn stops(&self, dt_s: f64) -> bool {
-        self.stop.is_always || self.meets(dt_s)
     }
 
     /// How fast it is where they touch.
@@ -180,6 +177,8 @@ fn at_start(row: &Row, start: &Start<'_>) -> Vector3<f64> {
 
 /// Nearer has come down to where they touch \[m\]: what is stopped at 10 m/s is a part in a million of its tick's way short of it.
 const TOUCHES_M: f64 = 2e-8;
+/// What a spring takes without more ado \[m/s\].
+const SLOW_M_S: f64 = 1e-4;
 /// What two bodies approach no faster with rests even without gravity \[m/s\]: what is stopped a million times harder than it
 /// moves has such a velocity left of 1 m/s.
 const CALM_M_S: f64 = 1e-6;
