@@ -303,7 +303,7 @@ mod tests {
         use rustix::fs::{MemfdFlags, SealFlags, fcntl_add_seals, memfd_create};
         let flags = MemfdFlags::ALLOW_SEALING | MemfdFlags::CLOEXEC;
         let made = File::from(memfd_create("content", flags).expect("memory"));
-        (&made).write_all(b"earlier rows").expect("room");
+        (&made).write_all(b"earlier rows").and_then(|()| (&made).rewind()).expect("room");
         fcntl_add_seals(&made, SealFlags::WRITE).expect("a seal");
         let read = || {
             let mut text = String::new();

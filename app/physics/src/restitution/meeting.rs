@@ -4,10 +4,12 @@
 //! It leaves from where it is, with the velocity at which it has what restitution leaves of the energy that it would meet
 //! with: of a bounce under gravity, `v_1^2 / 2 + g (h + v_1 dt) = e^2 (v_0^2 / 2 + g h)`, h above the ground. So bounces keep `e^2`
 //! of their energy at any rate. What bounces no higher than it is has to come down first: it stops where they touch, and
-//! leaves in the next tick as fast as it would have met. What approaches no faster than gravity makes it in a tick rests, and a bounce that gravity would end
-//! within the tick is none. Nor is one that anything else ended so: a contact that closes in a tick in which it did not
-//! approach was pushed back before it got off, and rests. Of two bodies that both fall, gravity takes nothing from how they approach;
-//! yet they rest as well when they are as slow.
+//! leaves in the next tick as fast as it would have met.
+//!
+//! What approaches no faster than gravity makes it in a tick rests, and a bounce that gravity would end within the tick is
+//! none. Nor is one that anything else ended so: a contact that closes in a tick in which it did not approach was pushed back
+//! before it got off, and rests. Of two bodies that both fall, gravity takes nothing from how they approach; yet they rest as
+//! well when they are as slow. Where springs hold what rests, what does not bounce is stopped before they are pressed.
 
 use nalgebra::Vector3;
 
