@@ -25,6 +25,7 @@
 mod beside;
 mod build;
 mod bvh;
+mod change;
 mod cone;
 mod crack;
 mod crossed;

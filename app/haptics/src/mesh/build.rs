@@ -4,8 +4,8 @@
 //! order; a walk over the mesh needs none of these.
 //!
 //! Model: validate, repair ([`repair`]), order in space ([`order`]), link ([`topology`]), close cracks ([`junction`]), wind
-//! ([`winding`]), unfold slivers ([`fold`]), close holes of what is nearly closed ([`hole`]), mark what passes through itself
-//! ([`crossed`](super::crossed)), turn closed parts outward ([`nesting`](super::nesting)). What was done is reported; what has no
+//! ([`winding`]), close holes of what is nearly closed ([`hole`]), part what meets at vertices ([`pinch`]), unfold slivers
+//! ([`fold`]), mark what passes through itself ([`crossed`](super::crossed)), turn closed parts outward ([`nesting`](super::nesting)). What was done is reported; what has no
 //! meaning is refused with the first offender.
 //!
 //! Invariants of the result: every face has an area; links are mutual; the same geometry gives the same mesh,
@@ -22,9 +22,6 @@ use std::sync::atomic::{AtomicU64, Ordering};
 
 /// A face is divided on one edge at a time.
 const MOST_DIVISIONS: usize = 4;
-
-/// A face is unfolded once at a time, and strips of slivers one by one.
-const MOST_UNFOLDINGS: usize = 8;
 
 /// How many meshes there have been.
 static BUILT: AtomicU64 = AtomicU64::new(0);
@@ -71,23 +68,23 @@ impl Mesh {
             links = link_again(&mut triangles, &mut vertices, &mut report)?;
         }
         let mut parts = winding::orient(&mut triangles, &mut links, &mut report);
-        for _ in 0..MOST_UNFOLDINGS {
-            if !fold::unfold(&mut triangles, &links, &vertices, &mut report.unfolded) {
-                break;
-            }
-            links = link_again(&mut triangles, &mut vertices, &mut report)?;
-            let flipped = std::mem::take(&mut report.flipped);
-            parts = winding::orient(&mut triangles, &mut links, &mut report);
-            report.flipped = flipped;
-        }
         if hole::close(holes, &mut triangles, &links, &mut vertices, &mut report) {
             links = link_again(&mut triangles, &mut vertices, &mut report)?;
             let flipped = std::mem::take(&mut report.flipped);
             parts = winding::orient(&mut triangles, &mut links, &mut report);
             report.flipped = flipped;
         }
+        let copies = pinch::part(&mut triangles, &links, &mut vertices);
+        if fold::unfold(&mut triangles, &links, &vertices, &copies, &mut report.unfolded) {
+            let told = report;
+            links = link_again(&mut triangles, &mut vertices, &mut report)?;
+            parts = winding::orient(&mut triangles, &mut links, &mut report);
+            // Parts have vertices of their own by now: that they touch can be told only as it was.
+            report.flipped = told.flipped;
+            (report.touching_edges, report.crowded_edges) = (told.touching_edges, told.crowded_edges);
+            pinch::part(&mut triangles, &links, &mut vertices);
+        }
         report.open_holes = hole::largest(&triangles, &links, &vertices);
-        pinch::part(&mut triangles, &links, &mut vertices);
         report_edges(&triangles, &links, &mut report);
         let faces: Box<[Face]> =
             (0..triangles.len()).map(|i| face(&triangles[i], &links[i], parts.sides(i), &vertices)).collect();

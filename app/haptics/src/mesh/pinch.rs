@@ -12,8 +12,13 @@ use super::Link;
 use super::order::Triangle;
 use nalgebra::Vector3;
 
-/// Copies go behind the other vertices, in the order of their fans' first faces.
-pub(super) fn part(triangles: &mut [Triangle], links: &[[Link; 3]], vertices: &mut Vec<Vector3<f64>>) {
+/// Copies go behind the other vertices, in the order of their fans' first faces; gives for each which vertex it is a copy of.
+pub(super) fn part(
+    triangles: &mut [Triangle],
+    links: &[[Link; 3]],
+    vertices: &mut Vec<Vector3<f64>>,
+) -> Vec<u32> {
+    let mut copies = Vec::new();
     let mut is_taken = vec![false; vertices.len()];
     let mut is_done = vec![[false; 3]; triangles.len()];
     for face in 0..triangles.len() {
@@ -24,6 +29,7 @@ pub(super) fn part(triangles: &mut [Triangle], links: &[[Link; 3]], vertices: &m
             let old = triangles[face].corners[corner] as usize;
             let new = if is_taken[old] {
                 vertices.push(vertices[old]);
+                copies.push(old as u32);
                 vertices.len() - 1
             } else {
                 old
@@ -34,6 +40,7 @@ pub(super) fn part(triangles: &mut [Triangle], links: &[[Link; 3]], vertices: &m
             });
         }
     }
+    copies
 }
 
 /// Visits the corners of a fan: one way round, and where the mesh ends, from the first one the other way.

@@ -101,7 +101,7 @@ pub struct MeshReport {
     pub vertices: usize,
     /// Parts that do not share an edge with one another.
     pub components: usize,
-    /// Input vertices that were equal to an earlier one up to rounding and were merged with it.
+    /// Input vertices that were equal to an earlier one up to rounding, not to the bit, and were merged with it.
     pub welded_vertices: Finding,
     /// Input vertices that no face uses; left out.
     pub unused_vertices: Finding,
@@ -109,7 +109,7 @@ pub struct MeshReport {
     pub degenerate: Finding,
     /// Faces divided, because a vertex of other faces lay on their edge.
     pub divided: Finding,
-    /// Slivers that were folded over their neighbour, up to 10 um wide; the edge between the two is another one now.
+    /// Slivers that were folded over their neighbour, up to 10 um wide: another edge divides the two now, or the sliver is gone.
     pub unfolded: Finding,
     /// Faces with the same three vertices as an earlier one; left out.
     pub duplicate: Finding,

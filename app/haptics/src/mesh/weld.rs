@@ -10,17 +10,14 @@ use super::repair::ROUNDING;
 use super::report::Finding;
 use nalgebra::Vector3;
 
-/// For each vertex the one that stands for it.
+/// For each vertex the one that stands for it. Noted is each place that another one stands for, but no vertex that is equal to an
+/// earlier one to the bit.
 pub(super) fn merge(vertices: &[Vector3<f64>], welded: &mut Finding) -> Vec<u32> {
     let mut stands_for = first_equal(vertices);
     let tolerance = ROUNDING * vertices.iter().map(Vector3::amax).fold(0.0, f64::max);
     if tolerance > 0.0 {
-        merge_close(vertices, tolerance, &mut stands_for);
+        merge_close(vertices, tolerance, &mut stands_for, welded);
     }
-    (0..)
-        .zip(&stands_for)
-        .filter(|(index, other)| index != *other)
-        .for_each(|(i, _)| welded.note(i as usize));
     stands_for
 }
 
@@ -66,7 +63,7 @@ fn first_equal(vertices: &[Vector3<f64>]) -> Vec<u32> {
 /// A cell is so many tolerances wide.
 const CELL: f64 = 1024.0;
 
-fn merge_close(vertices: &[Vector3<f64>], tolerance: f64, stands_for: &mut [u32]) {
+fn merge_close(vertices: &[Vector3<f64>], tolerance: f64, stands_for: &mut [u32], welded: &mut Finding) {
     let mut table = Table::for_vertices(vertices.len());
     let per_cell = 1.0 / (CELL * tolerance);
     // No border at zero, around which the roundings of symmetric parts lie.
@@ -89,7 +86,10 @@ fn merge_close(vertices: &[Vector3<f64>], tolerance: f64, stands_for: &mut [u32]
             found = (0..8).find_map(|i| table.find(hash(corner(i)), is_close).ok()).ok_or(()).or(found);
         }
         match found {
-            Ok(other) => stands_for[index] = other,
+            Ok(other) => {
+                stands_for[index] = other;
+                welded.note(index);
+            }
             Err(slot) => table.slots[slot] = index as u32,
         }
     }

@@ -107,10 +107,7 @@ fn whatever_the_build_does_to_faces_they_keep_their_coordinates() {
         (TriangleSoup { vertices, faces }, uv)
     };
     let (mesh, report) = Mesh::build_with_uv(spoilt.0, &spoilt.1).unwrap();
-    assert!(
-        report.flipped.count > 0 && report.duplicate.count == 1 && report.welded_vertices.count > 0,
-        "{report}"
-    );
+    assert!(report.flipped.count > 0 && report.duplicate.count == 1, "{report}");
     for (face, uv) in mesh.faces().iter().zip(mesh.uv().unwrap()) {
         for (vertex, uv) in face.vertices.iter().zip(uv) {
             let v = mesh.vertices()[*vertex as usize];

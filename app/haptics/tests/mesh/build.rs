@@ -262,7 +262,7 @@ fn vertices_that_are_equal_up_to_rounding_are_merged_and_minus_zero_is_zero() {
         faces: (0..12).map(|face| [3 * face, 3 * face + 1, 3 * face + 2]).collect(),
     };
     let (mesh, report) = build(own_corners.clone());
-    assert_eq!((report.vertices, report.welded_vertices.count), (8, 28));
+    assert_eq!((report.vertices, report.welded_vertices.count), (8, 0));
     assert!(report.is_clean(), "{report}");
     assert_eq!(mesh.faces(), build(cube.clone()).0.faces());
 
@@ -276,7 +276,8 @@ fn vertices_that_are_equal_up_to_rounding_are_merged_and_minus_zero_is_zero() {
         faces: own_corners.faces,
     };
     let (mesh, report) = build(noisy);
-    assert_eq!((report.vertices, report.welded_vertices.count, mesh.sides()), (8, 28, Sides::Solid));
+    // Two of the others are equal to the first to the bit.
+    assert_eq!((report.vertices, report.welded_vertices.count, mesh.sides()), (8, 26, Sides::Solid));
     assert!(report.is_clean(), "{report}");
 
     let mut soup = one_tetrahedron();
@@ -284,7 +285,7 @@ fn vertices_that_are_equal_up_to_rounding_are_merged_and_minus_zero_is_zero() {
     soup.vertices.push(point(-0.0, 1.0, -0.0));
     soup.faces[3][0] = 4;
     let (mesh, report) = build(soup);
-    assert_eq!(report.welded_vertices, found(1, 4));
+    assert_eq!((report.vertices, report.welded_vertices.count), (4, 0));
     assert_eq!(mesh.sides(), Sides::Solid);
     assert!(mesh.vertices().iter().flat_map(|v| v.iter()).all(|x| x.is_sign_positive()));
 
@@ -511,7 +512,7 @@ fn cubes_that_stand_edge_to_edge_are_joined_across_the_outside() {
     soup.faces.extend(other.faces.iter().map(|face| face.map(|v| v + 8)));
     soup.vertices.extend(other.vertices.iter().map(|v| v - point(0.5, 0.5, 0.0)));
     let (mesh, report) = build(soup.clone());
-    assert_eq!((report.welded_vertices.count, report.touching_edges.count, report.components), (2, 1, 1));
+    assert_eq!((report.vertices, report.touching_edges.count, report.components), (14, 1, 1));
     assert_eq!((mesh.sides(), mesh.faces().len()), (Sides::Solid, 24));
     assert_linked(&mesh);
     assert!((volume(&mesh) - 2.0).abs() < 1e-14, "rounding");

@@ -3,7 +3,7 @@
 use crate::common::meshes::*;
 use crate::common::*;
 use haptics::Friction;
-use haptics::mesh::{Mesh, MeshReport, TriangleSoup, make};
+use haptics::mesh::{Mesh, MeshReport, Sides, TriangleSoup, make};
 use nalgebra::Vector3;
 use std::sync::Arc;
 
@@ -102,5 +102,127 @@ fn a_point_that_is_stroked_over_a_fold_is_free_when_it_is_lifted() {
         hip.y = 1e-4;
         let out = step(&mut finger, &entity, &hip);
         assert!(out.entity.is_none(), "{seed}: {out:?}");
+    }
+}
+
+/// Vertices in front of an edge of the slab's top, so many and as far off it as that; some of them lie beyond it.
+struct Ragged {
+    soup: TriangleSoup,
+    /// As they run along the edge, with its ends.
+    chain: Vec<u32>,
+}
+
+impl Ragged {
+    /// Without faces between the edge and the vertices.
+    fn new(noise: &mut Noise) -> Self {
+        const HALF_M: f64 = 0.03;
+        let ring = [[-HALF_M, 0.0], [0.0, -HALF_M], [HALF_M, 0.0], [0.0, HALF_M]];
+        let mut vertices: Vec<_> =
+            [0.0, -0.01].iter().flat_map(|y| ring.map(|[x, z]| Vector3::new(x, *y, z))).collect();
+        let inner = 2 + noise.between(0.0, 5.0) as usize;
+        let mut along_m: Vec<_> = (0..inner).map(|_| noise.between(-0.0045, 0.0045)).collect();
+        along_m.sort_by(f64::total_cmp);
+        let mut chain = vec![8];
+        vertices.push(Vector3::new(-0.005, 0.0, 0.0));
+        for x in along_m {
+            // Two of them are no further apart than a sliver of a mesh of this size may be high, 6 um.
+            let off_m = 10f64.powf(noise.between(-7.0, -5.53));
+            chain.push(vertices.len() as u32);
+            vertices.push(Vector3::new(x, 0.0, if noise.between(0.0, 1.0) < 0.6 { -off_m } else { off_m }));
+        }
+        chain.push(vertices.len() as u32);
+        vertices.push(Vector3::new(0.005, 0.0, 0.0));
+        let (a, c, b, d) = (0, 1, 2, 3);
+        let (first, last) = (chain[0], chain[chain.len() - 1]);
+        let mut faces = vec![[a, c, first], [first, c, last], [last, c, b], [a, first, d], [last, b, d]];
+        faces.extend(chain.windows(2).map(|pair| [pair[0], pair[1], d]));
+        for i in 0..4 {
+            let j = (i + 1) % 4;
+            faces.extend([[j, i, i + 4], [j, i + 4, j + 4]]);
+        }
+        faces.extend([[4, 6, 5], [4, 7, 6]]);
+        // The faces of the top as they are wound here look down.
+        faces.iter_mut().for_each(|face| face.swap(1, 2));
+        Self { soup: TriangleSoup { vertices, faces }, chain }
+    }
+
+    /// With slivers there that all have this vertex of the chain for a corner, side by side and upon each other.
+    fn with_fan(mut self, hub: usize) -> TriangleSoup {
+        let count = self.chain.len();
+        let others: Vec<_> = (1..count).map(|i| self.chain[(hub + i) % count]).collect();
+        let hub = self.chain[hub];
+        self.soup.faces.extend(others.windows(2).map(|pair| [hub, pair[0], pair[1]]));
+        self.soup
+    }
+}
+
+fn read_again(mesh: &Mesh) -> (Mesh, MeshReport) {
+    let faces = mesh.faces().iter().map(|face| face.vertices).collect();
+    Mesh::build(TriangleSoup { vertices: mesh.vertices().to_vec(), faces }).unwrap()
+}
+
+/// Meshes with ragged slits: closed by a lid, and by slivers.
+fn ragged() -> impl Iterator<Item = (u64, Mesh, MeshReport)> {
+    (0..300).map(|seed| {
+        let mut noise = Noise(seed);
+        let ragged = Ragged::new(&mut noise);
+        let soup = if seed % 2 == 0 {
+            ragged.soup
+        } else {
+            let hub = noise.between(0.0, ragged.chain.len() as f64) as usize;
+            ragged.with_fan(hub)
+        };
+        let (mesh, report) = Mesh::build(soup).unwrap();
+        (seed, mesh, report)
+    })
+}
+
+#[test]
+fn folds_of_ragged_slits_are_unfolded_whether_lids_or_slivers_close_them() {
+    let mut unfolded = [0, 0];
+    for (seed, mesh, report) in ragged() {
+        assert_eq!(mesh.sides(), Sides::Solid, "{seed}: {report}");
+        assert_eq!(report.closed_holes.count, usize::from(seed % 2 == 0), "{seed}: {report}");
+        unfolded[(seed % 2) as usize] += usize::from(report.unfolded.count > 0);
+        for face in mesh.faces() {
+            let is_on_top = face.vertices.iter().all(|vertex| mesh.vertices()[*vertex as usize].y == 0.0);
+            assert!(!is_on_top || face.normal_B.y > 0.999, "{seed}: {face:?}");
+        }
+    }
+    assert!(unfolded.iter().all(|count| *count > 100), "{unfolded:?}");
+}
+
+#[test]
+fn a_mesh_that_was_unfolded_is_the_same_when_it_is_read_again() {
+    for (seed, mesh, _) in ragged() {
+        let (again, report) = read_again(&mesh);
+        assert!(report.is_clean(), "{seed}: {report}");
+        assert_eq!(again.vertices(), mesh.vertices(), "{seed}");
+        assert_eq!(again.faces(), mesh.faces(), "{seed}");
+    }
+}
+
+#[test]
+fn a_point_that_is_stroked_over_a_ragged_slit_is_free_when_it_is_lifted() {
+    for (seed, mesh, _) in ragged() {
+        let entity = touchable(&Arc::new(mesh), Friction::None);
+        let mut noise = Noise(seed + 1000);
+        for _ in 0..10 {
+            let mut finger = point_finger();
+            let x = noise.between(-0.005, 0.005);
+            let depth_m = 10f64.powf(noise.between(-6.0, -2.5));
+            let mut hip = Vector3::new(x, 1e-3, noise.between(-1e-3, 1e-3));
+            for tick in 0..40 {
+                hip.y = if tick < 5 { 1e-3 } else { -depth_m };
+                hip += Vector3::new(noise.between(-1e-4, 1e-4), 0.0, noise.between(-2e-4, 2e-4));
+                let out = step(&mut finger, &entity, &hip);
+                // A step over the slit, and nothing beyond.
+                let most_n = K * (depth_m + 3e-5);
+                assert!(out.force_on_user_W.norm() <= most_n, "{seed}, tick {tick}: {out:?}");
+            }
+            hip.y = 1e-4;
+            let out = step(&mut finger, &entity, &hip);
+            assert!(out.entity.is_none(), "{seed}: {out:?}");
+        }
     }
 }
