@@ -141,6 +141,9 @@ impl Curved {
 
     pub(super) fn tip_between(&self, from_B: &Vector3<f64>, to_B: &Vector3<f64>) -> Option<Vector3<f64>> {
         let Kind::Nappe { normal_y, offset_m, .. } = self.kind else { return None };
+        if normal_y == 0.0 {
+            return None;
+        }
         let (from_L, to_L) = (self.local(from_B), self.local(to_B));
         if from_L.x * to_L.x + from_L.z * to_L.z > 0.0 {
             return None;

@@ -2,6 +2,7 @@
 //!
 //! Model: Newton's method by the shortest way: each step leads to the nearest point that is on all tangent planes. One
 //! rigid patch takes one step, edges of curved patches two or three. At the end the tangent planes are those of where it ends.
+//! From beyond the tip of a cone the nearest point is the tip: a step along the normal would lead past the axis, off the cone.
 //!
 //! Cost: bounded by [`MAX_ROUNDS`] looks at each of up to three patches.
 
@@ -38,6 +39,12 @@ pub(super) fn settle_on<const N: usize>(
 ) -> (Vector3<f64>, [Look; N]) {
     let mut point_B = *from_B;
     let mut looks = looks_at(&patches, &point_B, hip_B);
+    if N == 1 && looks[0].height_m > 0.0 {
+        let foot_B = point_B + correction(&looks);
+        if let Some(tip_B) = patches[0].tip_between(&point_B, &foot_B) {
+            return (tip_B, looks_at(&patches, &tip_B, hip_B));
+        }
+    }
     if N == 1 && patches[0].is_distance() {
         // The first step leads there, and along it the normal is the same.
         point_B += correction(&looks);

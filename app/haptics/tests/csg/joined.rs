@@ -7,7 +7,7 @@ use std::ops::AddAssign;
 use crate::common::*;
 use crate::joints::{Leaf, SIZE_M, contains, joined, leaves};
 use crate::trees::{built, random_tree, touchable};
-use haptics::{CsgTree, Entity, Friction};
+use haptics::{Cone, CsgPart, CsgTree, Cuboid, Entity, Friction};
 use nalgebra::Vector3;
 
 /// Ticks with a fault, by kind.
@@ -286,6 +286,35 @@ fn a_finger_whose_god_object_flies_from_leaf_to_leaf_is_not_lost() {
 fn in_the_tip_of_a_conical_pit_a_finger_has_all_of_its_spring() {
     let (faults, _) = walk_over(11_582..11_583, joined);
     assert_eq!(faults.count(), 0, "{faults:?}");
+}
+
+/// A way for a finger without friction over a tree made by hand: nothing may be wrong in any of its ticks.
+fn check_way(name: &str, tree: CsgTree, way: impl Fn(f64) -> Vector3<f64>) {
+    let trial = Trial::new(tree);
+    let path: Vec<_> = (0..TICKS).map(|tick| way(f64::from(tick) / f64::from(TICKS - 1))).collect();
+    let faults = trial.walk(&trial.frictionless, &path, name);
+    assert!(faults.touched > TICKS / 2, "{name} {faults:?}");
+    assert_eq!(faults.count(), 0, "{name} {faults:?}");
+}
+
+/// Whoever is pressed beyond the tip of a conical pit is held in the tip, also where the wall all but leads on.
+#[test]
+fn beyond_the_tip_of_a_conical_pit_a_finger_is_held_in_the_tip() {
+    // A radius of 0.03 over a length of 0.024: across the wall it is 0.024 to 0.03.
+    let steepest = 0.024 / 0.03;
+    for share in [0.0, 0.5, 0.9, 0.97, 0.99, 0.999] {
+        for scale in [[1.0; 3], [1.3, 1.0, 1.3]] {
+            let pit = CsgPart::from(Cone::new(0.03, 0.0, 0.024).unwrap()).scaled(scale);
+            let tree = CsgTree::difference([CsgPart::from(Cuboid::new([0.1; 3]).unwrap()), pit]);
+            let steepest = steepest / scale[0];
+            check_way(&format!("share {share} {scale:?}"), tree, |t| {
+                let height_m = 4e-3 * (std::f64::consts::PI * t).sin() - 5e-4;
+                let aside_m = share * steepest * height_m.max(0.0);
+                let angle = 4.0 * t;
+                Vector3::new(aside_m * angle.cos(), 0.012 + height_m, aside_m * angle.sin())
+            });
+        }
+    }
 }
 
 /// Both, a hundred thousand trees and more: `cargo test --release -p haptics --test csg joined:: -- --ignored --nocapture`.
