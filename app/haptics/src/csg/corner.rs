@@ -8,7 +8,8 @@
 //! table calls free or solid. Of all free cells that are reached from the god-object's own through free cells, the
 //! point nearest to the HIP tells: in the open, the finger is free there; on one plane, along that patch; on two, along
 //! their edge; at the tip, nowhere. "In front of either" at convex edges and "in front of both" at concave ones follow,
-//! and two wedges that touch in an edge are two walls.
+//! and two wedges that touch in an edge are two walls. Patches that part no free cell from a solid one are left out, since
+//! of two that coincide the cells between them would bar the way.
 //!
 //! Frames and signs: object frame B, the god-object as origin. Invariant: which of several cells as near is taken
 //! depends on where they are, not on the order of the tree.
@@ -66,6 +67,20 @@ impl Corner {
     /// `sides` of the god-object's own cell; `to_hip_B` leads from the god-object to the HIP. `None` if all is solid.
     #[inline(always)]
     pub(super) fn facing(
+        &self,
+        near: &Neighbourhood,
+        sides: Sides,
+        to_hip_B: &Vector3<f64>,
+        release_m: f64,
+    ) -> Option<Facing> {
+        if !self.is_clear() {
+            return self.without_seams(near, sides).facing_among_all(near, sides, to_hip_B, release_m);
+        }
+        self.facing_among_all(near, sides, to_hip_B, release_m)
+    }
+
+    #[inline(always)]
+    fn facing_among_all(
         &self,
         near: &Neighbourhood,
         sides: Sides,
@@ -157,6 +172,31 @@ impl Corner {
     /// From bits of the corner to bits of the neighbourhood.
     pub(super) fn spread(&self, cell: usize) -> Sides {
         (0..self.count).fold(0, |sides, i| sides | (cell >> i & 1) << self.indices[i])
+    }
+
+    /// The same corner of only those patches that part free cells from solid ones. Two that coincide and part nothing, as where
+    /// two equal ends of leaves are cut off, have a slit between them that counts as no room: in front of it a god-object
+    /// would be held by nothing.
+    #[inline(never)]
+    fn without_seams(&self, near: &Neighbourhood, sides: Sides) -> Self {
+        let others = sides & !self.spread((1 << self.count) - 1);
+        let solid = (0..1usize << self.count)
+            .filter(|&cell| near.is_solid(others | self.spread(cell)))
+            .fold(0u64, |solid, cell| solid | 1 << cell);
+        let mut left = Self::new();
+        for (i, outside) in OUTSIDE.iter().enumerate().take(self.count) {
+            if (solid ^ solid >> (1 << i)) & outside & self.cells() != 0 {
+                left.indices[left.count] = self.indices[i];
+                left.normals_B[left.count] = self.normals_B[i];
+                left.count += 1;
+            }
+        }
+        left
+    }
+
+    /// A bit for each cell.
+    fn cells(&self) -> u64 {
+        u64::MAX >> (64 - (1u32 << self.count))
     }
 
     /// The normal of a patch into a cell: out of the patch, or into it where the cell is inside of it.

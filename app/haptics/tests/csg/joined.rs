@@ -7,7 +7,7 @@ use std::ops::AddAssign;
 use crate::common::*;
 use crate::joints::{Leaf, SIZE_M, contains, joined, leaves};
 use crate::trees::{built, random_tree, touchable};
-use haptics::{Cone, CsgPart, CsgTree, Cuboid, Entity, Friction};
+use haptics::{Capsule, Cone, CsgPart, CsgTree, Cuboid, Entity, Friction, Plane, Sphere};
 use nalgebra::Vector3;
 
 /// Ticks with a fault, by kind.
@@ -295,6 +295,27 @@ fn check_way(name: &str, tree: CsgTree, way: impl Fn(f64) -> Vector3<f64>) {
     let faults = trial.walk(&trial.frictionless, &path, name);
     assert!(faults.touched > TICKS / 2, "{name} {faults:?}");
     assert_eq!(faults.count(), 0, "{name} {faults:?}");
+}
+
+/// The end of a capsule and a ball in it coincide, and end together where both are cut; below lies a ball that is smaller by far
+/// more than what counts as one place. Beyond the cut neither of the two holds a finger.
+#[test]
+fn where_leaves_that_coincide_are_cut_off_a_god_object_falls_onto_what_is_below() {
+    let end = Vector3::new(0.0, -0.01, 0.0);
+    let sphere = |radius_m: f64| CsgPart::at(Sphere::new(radius_m).unwrap(), end);
+    for lower_m in [1e-7, 1e-6, 1e-5] {
+        let ends = CsgTree::union([CsgPart::from(Capsule::new(0.0126, 0.02).unwrap()), sphere(0.0126)]);
+        let cut =
+            CsgTree::difference([CsgPart::from(ends), Plane::new(-Vector3::y(), 0.013).unwrap().into()]);
+        let tree = CsgTree::union([CsgPart::from(cut), sphere(0.0126 - lower_m)]);
+        // Past the cut, where the normal falls by 0.24 of its length.
+        check_way(&format!("lower by {lower_m}"), tree, |t| {
+            let press_m = 1e-3 * (10.0 * t).min(10.0 * (1.0 - t)).min(1.0);
+            let (down, around) = (0.35 * t - 0.4, 3.0 * t);
+            let rho = (1.0 - down * down).sqrt();
+            end + Vector3::new(rho * around.cos(), down, rho * around.sin()) * (0.0128 - press_m)
+        });
+    }
 }
 
 /// Whoever is pressed beyond the tip of a conical pit is held in the tip, also where the wall all but leads on.
