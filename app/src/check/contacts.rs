@@ -55,7 +55,7 @@ impl Looks<'_> {
             .then(|| format!("{name} begins {:.2} mm deep in {other}, and will be pushed out", depth_m * 1e3))
     }
 
-    /// Its own weight brings it deeper than a hundredth of how thick the thinner one is.
+    /// Its own weight brings it deeper than a quarter of how thick the thinner one is: a little more, and it falls through.
     fn sinks(&self, a: usize, b: usize) -> Option<String> {
         let stiffness_n_per_m = self.stiffness_n_per_m(a, b);
         let sinks_m = self.weights_n[a] / stiffness_n_per_m;
@@ -64,8 +64,8 @@ impl Looks<'_> {
         let [name, other] = self.names([a, b]);
         (sinks_m > SHARE_OF_THICKNESS * thickness_m).then(|| {
             format!(
-                "{name} sinks {:.2} mm into {other}, as soft as it is ({stiffness_n_per_m} N/m a point); leave out \
-                 `contact_stiffness`, or give {name} a larger `contact_stiffness_n_per_m`",
+                "{name} sinks {:.2} mm into {other}, as soft as it is ({stiffness_n_per_m:.0} N/m a point); say `contact_stiffness = \
+                 {{ kind = \"by-mass\" }}` at the top of the scene, or give {name} a larger `contact_stiffness_n_per_m`",
                 sinks_m * 1e3
             )
         })
@@ -131,5 +131,5 @@ fn depth(a: &Entity, b: &Entity) -> f64 {
 
 /// A tenth of a millimetre is what rounding in a file leaves.
 const LEAST_DEPTH_M: f64 = 1e-4;
-const SHARE_OF_THICKNESS: f64 = 0.01;
+const SHARE_OF_THICKNESS: f64 = 0.25;
 const MOST_TOLD: usize = 10;

@@ -69,9 +69,10 @@ pub enum ResponseSpec {
 }
 
 /// How stiff contacts between entities are that do not say it themselves; their dampers are this share of the critical one.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub enum ContactStiffnessSpec {
     /// As fingers feel both surfaces, with both dampers.
+    #[default]
     AsFelt,
     /// By the mass of the heaviest thing that moves.
     ByMass {
@@ -85,12 +86,6 @@ pub enum ContactStiffnessSpec {
         /// 1: critical.
         damping_ratio: f64,
     },
-}
-
-impl Default for ContactStiffnessSpec {
-    fn default() -> Self {
-        Self::ByMass { damping_ratio: 1.0 }
-    }
 }
 
 impl Default for ResponseSpec {

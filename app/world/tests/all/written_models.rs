@@ -12,7 +12,7 @@ fn written(soup: TriangleSoup) -> (Mesh, MeshReport, String) {
     (mesh, report, text)
 }
 
-/// A ball with all that can be repaired: vertices of its own for each face, faces turned over, given twice, without area,
+/// A ball with all that can be repaired: vertices of its own for each face, one of them rounded otherwise, faces turned over, given twice, without area,
 /// missing, with a vertex on an edge, and a vertex of none.
 fn spoilt() -> TriangleSoup {
     let ball = make::bumpy_sphere(24, 12, 0.04);
@@ -26,6 +26,8 @@ fn spoilt() -> TriangleSoup {
         let corners = if number % 7 == 0 { [0, 2, 1] } else { [0, 1, 2] };
         soup.faces.push(corners.map(|corner| begin + corner));
     }
+    // Another one up to rounding.
+    soup.vertices[150].x = soup.vertices[150].x.next_up();
     soup.vertices.push([1.0, 2.0, 3.0].into());
     // In two halves along a line to the middle of an edge, which the neighbour knows nothing of.
     let [a, b, c] = soup.faces[200];

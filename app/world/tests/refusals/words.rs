@@ -184,7 +184,7 @@ fn a_contact_stiffness_that_is_none_or_does_not_fit_its_kind_is_refused() {
     for (stiffness, message) in [
         (
             "{ kind = \"hard\" }",
-            "s.toml:1: contact_stiffness.kind: unknown contact stiffness \"hard\"; allowed: by-mass, as-felt, given",
+            "s.toml:1: contact_stiffness.kind: unknown contact stiffness `hard`; allowed: by-mass, as-felt, given",
         ),
         (
             "{ kind = \"given\", stiffness_n_per_m = 0 }",
