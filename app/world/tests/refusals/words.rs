@@ -192,11 +192,11 @@ fn a_contact_stiffness_that_is_none_or_does_not_fit_its_kind_is_refused() {
         ),
         (
             "{ kind = \"by-mass\", stiffness_n_per_m = 1e5 }",
-            "s.toml:1: contact_stiffness.stiffness_n_per_m: found 100000; allowed: none, but with kind = \"given\"",
+            "s.toml:1: contact_stiffness.stiffness_n_per_m: found 1e5; allowed: none, but with kind = \"given\"",
         ),
         (
             "{ kind = \"as-felt\", damping_ratio = 1.0 }",
-            "s.toml:1: contact_stiffness.damping_ratio: found 1; allowed: none with kind = \"as-felt\": dampers are the entities' own",
+            "s.toml:1: contact_stiffness.damping_ratio: found 1.0; allowed: none with kind = \"as-felt\": dampers are the entities' own",
         ),
     ] {
         refused(&scene(stiffness), message);
