@@ -29,7 +29,7 @@ pub struct Anchor {
     held: Held,
     /// It came nearer when the last tick began, fast enough to bounce.
     pub(crate) approached: bool,
-    /// How fast it met in the last tick, and has to leave in this one \[m/s\]; 0: it need not.
+    /// Speed at which it met in the last tick, and has to leave in this one \[m/s\]; 0: it need not.
     pub(crate) owed_m_s: f64,
     /// How much of a depth that was there from the start is still granted \[m\].
     pub(crate) granted_m: f64,

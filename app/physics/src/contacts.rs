@@ -16,7 +16,7 @@ use haptics::Entity;
 
 use crate::pair::Response;
 
-/// How stiff contacts between entities are that do not say it themselves.
+/// Stiffness of contacts between entities that do not say it themselves.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub enum ContactStiffness {
     /// As fingers feel both surfaces, with both entities' dampers.
@@ -36,18 +36,18 @@ pub enum ContactStiffness {
     },
 }
 
-/// How contacts between entities answer, and how stiff they are.
+/// Response and stiffness of contacts between entities.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Contacts {
-    /// How they answer.
+    /// Their response.
     pub response: Response,
-    /// Whether nothing is reflected that a spring presses: of an integrator that knows its forces when the tick begins.
+    /// True where nothing is reflected that a spring presses: of an integrator that knows its forces when the tick begins.
     pub springs_only: bool,
     /// Of points between entities that do not say it themselves: stiffness \[N/m\] and damping ratio. `None`: as felt.
     own: Option<(f64, f64)>,
 }
 
-/// What is damped at a contact point.
+/// Damping of a contact point.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum ContactDamping {
     /// \[N s/m\]
@@ -77,7 +77,7 @@ impl Contacts {
         Self { response, springs_only: false, own: own.filter(|(stiffness, _)| *stiffness > 0.0) }
     }
 
-    /// How a contact between two entities answers. Of a stiffness that is no finger's what meets stops, if nobody says otherwise.
+    /// Response of a contact between two entities. Of a stiffness that is no finger's what meets stops, if nobody says otherwise.
     pub fn response(&self, a: &Entity, b: &Entity) -> Response {
         match self.response.between(a, b) {
             Response::Bounce { .. } if self.springs_only => Response::Force,

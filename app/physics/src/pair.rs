@@ -235,7 +235,7 @@ impl Pair {
         self.ledger.pay(owed_j)
     }
 
-    /// What of a row's force is a spring's: along the normal impulses are no springs', and those of an impact not across it either.
+    /// Part of a row's force that is a spring's: along the normal impulses are no springs', and those of an impact not across it either.
     fn of_spring_W(&self, row: &Row) -> Vector3<f64> {
         let is_spring = row.stiffness[1] == self.surfacing.stiffness_n_per_m;
         match (is_spring, self.surfacing.response.has_springs()) {

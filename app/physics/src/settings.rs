@@ -16,7 +16,7 @@ pub struct Settings {
     pub integrator: Integrator,
     /// How contacts between entities answer.
     pub response: Response,
-    /// How stiff they are, if the integrator is implicit; else they are as felt.
+    /// Their stiffness, if the integrator is implicit; else they are as felt.
     pub contact_stiffness: ContactStiffness,
     /// Nothing moves faster \[m/s\].
     pub most_speed_m_s: f64,

@@ -20,7 +20,7 @@ pub(super) fn all(rig: &Rig, entities: &[Entity]) -> Vec<String> {
     found
 }
 
-/// What is looked at.
+/// Things that are looked at.
 struct Looks<'a> {
     rig: &'a Rig,
     entities: &'a [Entity],

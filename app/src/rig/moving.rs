@@ -43,7 +43,7 @@ impl Rig {
         self.bodies(entities).filter_map(|body| body.ok().map(|(index, body)| (index, body.mass.mass_kg)))
     }
 
-    /// What holds for all bodies.
+    /// Settings of all bodies.
     fn dynamics(&self) -> Settings {
         let dynamics = self.scene.dynamics;
         Settings {

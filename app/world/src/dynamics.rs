@@ -14,7 +14,7 @@ pub struct DynamicsSpec {
     pub integrator: IntegratorSpec,
     /// How contacts between entities answer.
     pub response: ResponseSpec,
-    /// How stiff contacts between entities are that do not say it themselves.
+    /// Stiffness of contacts between entities that do not say it themselves.
     pub stiffness: ContactStiffnessSpec,
     /// Whether it is told how good the grasp of each is.
     pub grasp_quality: bool,
@@ -68,7 +68,7 @@ pub enum ResponseSpec {
     },
 }
 
-/// How stiff contacts between entities are that do not say it themselves; their dampers are this share of the critical one.
+/// Stiffness of contacts between entities that do not say it themselves; their dampers are this share of the critical one.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub enum ContactStiffnessSpec {
     /// As fingers feel both surfaces, with both dampers.
@@ -136,7 +136,7 @@ impl ResponseSpec {
     }
 }
 
-/// How much of an approaching velocity comes back, if the table says.
+/// Share of an approaching velocity that comes back, if the table says.
 pub(crate) fn read_restitution(table: &Table<'_>) -> Result<Option<f64>, SceneError> {
     let Some(value) = table.get("restitution") else { return Ok(None) };
     match value.number(Bound::NotNegative)? {

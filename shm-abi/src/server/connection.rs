@@ -49,7 +49,7 @@ pub(super) enum Offer {
 }
 
 impl Offer {
-    /// What took too long.
+    /// Reason, in words.
     pub(super) fn why_overdue(&self) -> String {
         let seconds = TAKEN_WITHIN.as_secs();
         match self {

@@ -39,7 +39,7 @@ pub(super) fn may_observe(
     has_place(newcomer, most, observers)
 }
 
-/// Whether there is a place for a commander beside those who have left unread what they were sent.
+/// True if there is a place for a commander beside those who have left unread what they were sent.
 pub(super) fn may_command(newcomer: Owner, left: impl Iterator<Item = Owner>) -> bool {
     has_place(newcomer, MAX_OBSERVERS + FOR_COMMANDERS, left)
 }

@@ -26,7 +26,7 @@ pub(super) struct Change {
 /// A face and its corners.
 pub(super) type Placed = (u32, [u32; 3]);
 
-/// What a change is to make smaller.
+/// Quantities that a change is to make smaller.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Measure {
     folded_edges: usize,
@@ -168,7 +168,7 @@ impl<'a> Changing<'a> {
             })
     }
 
-    /// How thick the layer is, parallel to the largest of some faces, that all of them lie in.
+    /// Thickness of the layer, parallel to the largest of some faces, that all of them lie in.
     fn thickness_m(&self, faces: &[u32]) -> f64 {
         let area = |face: &u32| area_vector(&self.at(&self.corners[*face as usize]));
         let largest = faces.iter().map(area).max_by(|a, b| a.norm_squared().total_cmp(&b.norm_squared()));
@@ -227,7 +227,7 @@ impl<'a> Changing<'a> {
         (is_proper && measure.is_less_than(&old)).then_some(Change { before, after, moved, measure })
     }
 
-    /// Whether no new edge and no new face lies upon one of another fan, which a file could not tell from it.
+    /// True if no new edge and no new face lies upon one of another fan, which a file could not tell from it.
     fn is_alone(&self, after: &[Placed], before: &[Placed]) -> bool {
         let original = |corner: u32| self.original.get(&corner).copied().unwrap_or(corner);
         let is_upon = |corners: &[u32], of: &[u32; 3]| {

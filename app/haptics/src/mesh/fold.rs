@@ -82,7 +82,7 @@ pub(super) fn is_sliver(points: &[Vector3<f64>; 3], widest_m: f64) -> bool {
     area_vector(points).norm_squared() <= widest_m * widest_m * longest_m2
 }
 
-/// Whether two faces, wound alike, look opposite ways.
+/// True if two faces, wound alike, look opposite ways.
 pub(super) fn is_folded_over(points: &[Vector3<f64>; 3], others: &[Vector3<f64>; 3]) -> bool {
     let [area, other] = [points, others].map(area_vector);
     area.dot(&other) < FOLDED * area.norm() * other.norm()

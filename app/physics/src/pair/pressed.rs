@@ -87,7 +87,7 @@ fn middle_W(motion: &Motion, dt_s: f64) -> UnitQuaternion<f64> {
     UnitQuaternion::from_scaled_axis(if turn_W.norm_squared() < 0.25 { turn_W } else { Vector3::zeros() })
 }
 
-/// How fast the two give way along the normal, per impulse.
+/// Velocity with which the two give way along the normal, per impulse.
 fn gives_per_kg(row: &Row, start: &Start<'_>) -> f64 {
     let give = |body: usize, arm_W: &Vector3<f64>| {
         let motion = &start.motions[body];

@@ -24,12 +24,12 @@ pub enum Response {
 }
 
 impl Response {
-    /// Whether a spring presses what rests.
+    /// True if a spring presses what rests.
     pub(crate) fn has_springs(self) -> bool {
         !matches!(self, Self::Impulse { .. })
     }
 
-    /// How much of an approaching velocity comes back; `None`: what the spring and its damper leave.
+    /// Share of an approaching velocity that comes back; `None`: what the spring and its damper leave.
     pub(crate) fn restitution(self) -> Option<f64> {
         match self {
             Self::Force => None,

@@ -19,12 +19,12 @@ use crate::pair::{Start, let_out_m_s};
 use crate::row::Row;
 use crate::solver::Motion;
 
-/// What stops a contact point.
+/// Stop of a contact point, without a spring.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Stop {
     /// Damping along the normal that stops what it presses.
     pub(crate) n_s_per_m: f64,
-    /// Whether it holds what rests, too; else a spring does.
+    /// True if it holds what rests, too; else a spring does.
     pub(crate) is_always: bool,
 }
 
@@ -48,7 +48,7 @@ pub(crate) struct Meeting {
     is_held: bool,
     /// With which normal velocity it stops where they touch \[m/s\].
     stops_m_s: f64,
-    /// How fast they met in the last tick, in which there was no room to leave \[m/s\]; 0: they did not.
+    /// Speed at which they met in the last tick, in which there was no room to leave \[m/s\]; 0: they did not.
     owed_m_s: f64,
 }
 
@@ -123,7 +123,7 @@ impl Meeting {
         }
     }
 
-    /// How fast it is where they touch.
+    /// Its speed where they touch.
     fn meets_at_m_s(&self, dt_s: f64) -> f64 {
         let falls_m_s2 = -self.grows_m_s / dt_s;
         let squared = self.approaches_m_s.powi(2) + 2.0 * falls_m_s2 * self.gap_m.max(0.0);
@@ -157,7 +157,7 @@ impl Meeting {
     }
 }
 
-/// What comes of a meeting.
+/// Outcome of a meeting.
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Leaves {
     /// Gravity ends the bounce within the tick.
@@ -179,7 +179,7 @@ fn at_start(row: &Row, start: &Start<'_>) -> Vector3<f64> {
 
 /// Nearer has come down to where they touch \[m\]: what is stopped at 10 m/s is a part in a million of its tick's way short of it.
 const TOUCHES_M: f64 = 2e-8;
-/// What a spring takes without more ado \[m/s\].
+/// Speed that a spring takes without more ado \[m/s\].
 const SLOW_M_S: f64 = 1e-4;
 /// What two bodies approach no faster with rests even without gravity \[m/s\]: what is stopped a million times harder than it
 /// moves has such a velocity left of 1 m/s.
