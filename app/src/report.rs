@@ -163,10 +163,11 @@ impl fmt::Display for Report {
 
 /// What became of a recording, of a run that could not hand on so many rows.
 pub(crate) fn recording_line(recorded: &Recorded, rows_lost: u64) -> String {
-    let Recorded { path, rows, unit, lost, failure, is_as_before } = recorded;
+    let Recorded { path, rows, unit, lost, is_left_behind, failure, is_as_before } = recorded;
     let who = if is_standard_output(path) { "its reader" } else { "the disk" };
     let lost = match lost + rows_lost {
         0 => String::new(),
+        lost if *is_left_behind => format!(" at least, {lost} LOST at most: {who} was too slow"),
         lost => format!(", {lost} LOST: {who} was too slow"),
     };
     let end = match (failure, is_as_before) {

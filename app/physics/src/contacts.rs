@@ -1,4 +1,4 @@
-//! How stiff and how damped contacts between entities are.
+//! Stiffness and damping of contacts between entities.
 //!
 //! Problem: what fingers feel is soft, for a hand stands a few newtons per millimetre at best. On a shelf of that stiffness a
 //! ball of steel sinks out of sight.
@@ -112,6 +112,10 @@ impl Contacts {
 }
 
 impl ContactDamping {
+    pub(crate) fn is_ratio(self) -> bool {
+        matches!(self, Self::Ratio(_))
+    }
+
     /// Coefficient at a point of this stiffness (N/m) where the two give way with a velocity per impulse of so much
     /// (1/kg) \[N s/m\].
     #[inline]

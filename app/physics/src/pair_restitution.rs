@@ -14,8 +14,8 @@ use haptics::Entity;
 use crate::pair::Response;
 
 impl Response {
-    /// What it is between two entities: `self`'s restitution is that of pairs of which neither says one. What is pressed by
-    /// a spring alone bounces if either says so.
+    /// Response between two entities: `self`'s restitution is that of pairs of which neither says one. What is pressed by a
+    /// spring alone bounces if either says so.
     #[must_use]
     pub fn between(self, a: &Entity, b: &Entity) -> Self {
         let own = match (a.restitution, b.restitution) {

@@ -175,6 +175,25 @@ mod tests {
         }
     }
 
+    /// A write into a pipe does not say how much of it has got there.
+    #[test]
+    fn of_a_table_that_nobody_reads_no_row_is_counted_that_has_not_reached_the_pipe() {
+        let directory = tempfile::tempdir().expect("a directory");
+        let (mut recorder, mut reader) = piped(&directory.path().join("pipe"), Duration::from_millis(300));
+        let mut sent = 0;
+        while !recorder.has_failed() && sent < 100_000 {
+            recorder.send(&Row { run_tick: sent, ..Row::empty() }, &[]);
+            sent += 1;
+        }
+        let Recorded { rows, lost, is_left_behind, .. } = recorder.finish();
+        assert!(is_left_behind && rows + lost == sent, "{rows} {lost} of {sent}");
+        let mut piece = vec![0; 1 << 16];
+        let count = reader.read(&mut piece).expect("what is in the pipe");
+        let lines = piece[..count].iter().filter(|byte| **byte == b'\n').count() as u64;
+        // One is the header.
+        assert!(lines > 1000 && rows < lines, "{rows} of {lines}");
+    }
+
     #[test]
     fn a_reader_who_comes_back_too_late_finds_a_table_without_a_gap_and_the_recording_is_not_complete() {
         let directory = tempfile::tempdir().expect("a directory");

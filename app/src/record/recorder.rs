@@ -49,6 +49,8 @@ pub struct Recorded {
     pub unit: &'static str,
     /// Rows that the recorder had no room for.
     pub lost: u64,
+    /// Its thread was left behind in the middle of a write: more of the rows may have reached it.
+    pub is_left_behind: bool,
     /// Why it is not complete, if it is not; has been told.
     pub failure: Option<String>,
     /// The file has its earlier content: no tick came, or not even the first rows would fit.
@@ -59,7 +61,7 @@ impl Recorded {
     /// A recording for which there is no file, or somebody else's.
     pub fn not_begun(error: &RecordingError) -> Self {
         let (path, failure) = (error.file().into(), Some(error.to_string()));
-        Self { path, rows: 0, unit: "rows", lost: 0, failure, is_as_before: false }
+        Self { path, rows: 0, unit: "rows", lost: 0, is_left_behind: false, failure, is_as_before: false }
     }
 }
 
@@ -355,7 +357,8 @@ impl Recorder {
             Err(_) => (0, Some(panicked(&path))),
         };
         let is_as_before = shared.is_as_before.load(Ordering::Relaxed);
-        Recorded { path, rows, unit, lost, failure: failure.or(given_up), is_as_before }
+        let failure = failure.or(given_up);
+        Recorded { path, rows, unit, lost, is_left_behind: false, failure, is_as_before }
     }
 
     /// The thread ends with the process.
@@ -375,6 +378,7 @@ impl Recorder {
             rows,
             unit: self.unit,
             lost: self.lost + self.sent.saturating_sub(rows),
+            is_left_behind: true,
             failure: Some(why),
             is_as_before: false,
         }

@@ -1,5 +1,5 @@
-//! How a scene's moving entities are computed: `integrator`, `contact_response`, `contact_stiffness`, `grasp_quality`, `sleep` and `lists`; and
-//! what an entity's `restitution` is.
+//! Settings of how a scene's moving entities are computed: `integrator`, `contact_response`, `contact_stiffness`,
+//! `grasp_quality`, `sleep` and `lists`; and an entity's `restitution`.
 
 use crate::error::SceneError;
 use crate::grid::MAX_ENTITIES;

@@ -92,6 +92,21 @@ mod tests {
     }
 
     #[test]
+    fn whoever_may_only_look_takes_no_place_from_commanders() {
+        let left = MAX_OBSERVERS - FOR_ADMINISTRATORS;
+        let strangers: Vec<_> = (0..left as u32).map(|id| owner(id % 2, id)).collect();
+        assert!(!may_observe(owner(999, 999), false, strangers.iter().copied()));
+        assert!(may_command(owner(999, 999), strangers.iter().copied()));
+        // One who leaves unread what commanders are sent keeps nobody else out.
+        let own: Vec<_> = (0..MAX_OBSERVERS_OF_USER as u32).map(|pid| owner(1, pid)).collect();
+        assert!(!may_command(owner(1, 999), own.iter().copied()));
+        assert!(may_command(owner(2, 999), own.iter().copied()));
+        let all: Vec<_> = (0..(MAX_OBSERVERS + FOR_COMMANDERS) as u32).map(|id| owner(id, id)).collect();
+        assert!(may_command(owner(999, 999), all[1..].iter().copied()));
+        assert!(!may_command(owner(999, 999), all.iter().copied()));
+    }
+
+    #[test]
     fn who_has_the_most_silent_connections_loses_the_oldest_of_them() {
         assert_eq!(to_evict(&[]), None);
         let [quiet, first, second] = [owner(1, 1), owner(2, 2), owner(2, 3)];

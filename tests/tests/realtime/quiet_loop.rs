@@ -34,7 +34,7 @@ backend = \"simulated\"
 description = \"premium-1.5\"
 ";
 
-/// How a commander waits for the next frame.
+/// Ways in which a commander waits for the next frame.
 #[derive(Clone, Copy)]
 enum Waits {
     Spinning,

@@ -5,8 +5,8 @@
 //!
 //! Model: validate, repair ([`repair`]), order in space ([`order`]), link ([`topology`]), close cracks ([`junction`]), wind
 //! ([`winding`]), close holes of what is nearly closed ([`hole`]), part what meets at vertices ([`pinch`]), unfold slivers
-//! ([`fold`]), mark what passes through itself ([`crossed`](super::crossed)), turn closed parts outward ([`nesting`](super::nesting)). What was done is reported; what has no
-//! meaning is refused with the first offender.
+//! ([`fold`]), mark what passes through itself ([`crossed`](super::crossed)), turn closed parts outward
+//! ([`nesting`](super::nesting)). What was done is reported; what has no meaning is refused with the first offender.
 //!
 //! Invariants of the result: every face has an area; links are mutual; the same geometry gives the same mesh,
 //! whatever the order of its faces and vertices was in the input.

@@ -2,8 +2,8 @@
 
 use crate::common::meshes::*;
 use crate::common::*;
-use haptics::Friction;
 use haptics::mesh::{Mesh, MeshReport, Sides, TriangleSoup, make};
+use haptics::{Entity, Friction};
 use nalgebra::Vector3;
 use std::sync::Arc;
 
@@ -80,6 +80,26 @@ fn a_sliver_at_a_sharp_edge_is_unfolded_into_the_wall() {
     }
 }
 
+/// A frictionless point comes down somewhere within so far of the middle (m, along x and z), is stroked about for so many ticks,
+/// and lifted: its force is that of its depth, and then none.
+fn stroke_and_lift(seed: u64, entity: &Entity, noise: &mut Noise, [x_m, z_m]: [f64; 2], ticks: u32) {
+    let mut finger = point_finger();
+    let x = noise.between(-x_m, x_m);
+    let depth_m = 10f64.powf(noise.between(-6.0, -2.5));
+    let mut hip = Vector3::new(x, 1e-3, noise.between(-z_m, z_m));
+    for tick in 0..ticks {
+        hip.y = if tick < 5 { 1e-3 } else { -depth_m };
+        hip += Vector3::new(noise.between(-1e-4, 1e-4), 0.0, noise.between(-2e-4, 2e-4));
+        let out = step(&mut finger, entity, &hip);
+        // A step over the fold, and nothing beyond.
+        let most_n = K * (depth_m + 3e-5);
+        assert!(out.force_on_user_W.norm() <= most_n, "{seed}, tick {tick}, {depth_m} m: {out:?}");
+    }
+    hip.y = 1e-4;
+    let out = step(&mut finger, entity, &hip);
+    assert!(out.entity.is_none(), "{seed}, {depth_m} m: {out:?}");
+}
+
 #[test]
 fn a_point_that_is_stroked_over_a_fold_is_free_when_it_is_lifted() {
     for seed in 0..400 {
@@ -87,21 +107,7 @@ fn a_point_that_is_stroked_over_a_fold_is_free_when_it_is_lifted() {
         let off_m = 10f64.powf(noise.between(-12.0, -5.3));
         let (mesh, _) = folded(off_m, noise.between(-0.9, 0.9));
         let entity = touchable(&Arc::new(mesh), Friction::None);
-        let mut finger = point_finger();
-        let x = noise.between(-0.015, 0.015);
-        let depth_m = 10f64.powf(noise.between(-6.0, -2.5));
-        let mut hip = Vector3::new(x, 1e-3, noise.between(-2e-3, 2e-3));
-        for tick in 0..60 {
-            hip.y = if tick < 5 { 1e-3 } else { -depth_m };
-            hip += Vector3::new(noise.between(-1e-4, 1e-4), 0.0, noise.between(-2e-4, 2e-4));
-            let out = step(&mut finger, &entity, &hip);
-            // A step over the fold, and nothing beyond.
-            let most_n = K * (depth_m + 3e-5);
-            assert!(out.force_on_user_W.norm() <= most_n, "{seed}, tick {tick}: {out:?}");
-        }
-        hip.y = 1e-4;
-        let out = step(&mut finger, &entity, &hip);
-        assert!(out.entity.is_none(), "{seed}: {out:?}");
+        stroke_and_lift(seed, &entity, &mut noise, [0.015, 2e-3], 60);
     }
 }
 
@@ -208,21 +214,7 @@ fn a_point_that_is_stroked_over_a_ragged_slit_is_free_when_it_is_lifted() {
         let entity = touchable(&Arc::new(mesh), Friction::None);
         let mut noise = Noise(seed + 1000);
         for _ in 0..10 {
-            let mut finger = point_finger();
-            let x = noise.between(-0.005, 0.005);
-            let depth_m = 10f64.powf(noise.between(-6.0, -2.5));
-            let mut hip = Vector3::new(x, 1e-3, noise.between(-1e-3, 1e-3));
-            for tick in 0..40 {
-                hip.y = if tick < 5 { 1e-3 } else { -depth_m };
-                hip += Vector3::new(noise.between(-1e-4, 1e-4), 0.0, noise.between(-2e-4, 2e-4));
-                let out = step(&mut finger, &entity, &hip);
-                // A step over the slit, and nothing beyond.
-                let most_n = K * (depth_m + 3e-5);
-                assert!(out.force_on_user_W.norm() <= most_n, "{seed}, tick {tick}: {out:?}");
-            }
-            hip.y = 1e-4;
-            let out = step(&mut finger, &entity, &hip);
-            assert!(out.entity.is_none(), "{seed}: {out:?}");
+            stroke_and_lift(seed, &entity, &mut noise, [0.005, 1e-3], 40);
         }
     }
 }

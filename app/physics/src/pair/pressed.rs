@@ -53,7 +53,8 @@ pub(super) fn row(
         torsion: Torsion::default(),
         tie_n: None,
     };
-    let gives_per_kg = gives_per_kg(&row, start);
+    let is_asked_for = surfacing.damping.is_ratio() || surfacing.response.restitution().is_some();
+    let gives_per_kg = if is_asked_for { gives_per_kg(&row, start) } else { 0.0 };
     row.damping = row.stiffness.map(|k| surfacing.damping.n_s_per_m(k, gives_per_kg));
     let [b, b_across] = row.damping;
     // So large that velocities are what is wanted. Nothing can be stopped that nothing moves.

@@ -1,4 +1,4 @@
-//! What two surfaces make of each other: stiffness and damping of [`Contacts`], friction the geometric mean.
+//! Properties of a contact between two surfaces: stiffness and damping of [`Contacts`], friction the geometric mean.
 
 use haptics::Entity;
 
@@ -54,10 +54,7 @@ pub struct Surfacing {
 impl Surfacing {
     /// Things that rest on each other are no deeper \[m\]: what is found deeper was placed there, and its spring would throw it.
     pub(crate) fn deepest_rest_m(&self) -> f64 {
-        match self.damping {
-            ContactDamping::Constant(_) => f64::INFINITY,
-            ContactDamping::Ratio(_) => DEEPEST_REST_M,
-        }
+        if self.damping.is_ratio() { DEEPEST_REST_M } else { f64::INFINITY }
     }
 
     /// Of two entities.

@@ -6,8 +6,8 @@
 //! of their energy at any rate. What bounces no higher than it is has to come down first: it stops where they touch, and
 //! leaves in the next tick as fast as it would have met.
 //!
-//! What approaches no faster than gravity makes it in a tick rests, and a bounce that gravity would end within the tick is
-//! none. Nor is one that anything else ended so: a contact that closes in a tick in which it did not approach was pushed back
+//! A point that approaches no faster than gravity makes it in a tick rests, and a bounce that gravity would end within the
+//! tick is none. Nor is one that anything else ended so: a contact that closes in a tick in which it did not approach was pushed back
 //! before it got off, and rests. Of two bodies that both fall, gravity takes nothing from how they approach; yet they rest as
 //! well when they are as slow. Where springs hold what rests, what does not bounce is stopped before they are pressed.
 

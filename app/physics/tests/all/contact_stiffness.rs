@@ -160,7 +160,7 @@ fn a_tower_of_forty_stands_and_sinks_by_a_sum() {
     }
 }
 
-/// Which of its many corners bear it is chosen anew as it sways; on hard contacts it does not.
+/// As one sways, other corners of many bear it; on hard contacts it does not sway.
 #[test]
 fn round_meshes_that_are_put_down_stand_upright_and_rest_within_a_second() {
     for (sides, rate_hz) in [(8, 1000.0), (48, 500.0), (48, 1000.0), (48, 4000.0), (200, 1000.0)] {

@@ -177,7 +177,7 @@ fn what_was_placed_deep_comes_to_rest_on_all_of_its_depth() {
     assert!(off.abs() < 1e-9, "{off}");
 }
 
-/// What meets is reflected by impulses, which may give a little where arms turn; see `energy_impulse.rs`.
+/// Impulses reflect what meets, and may give a little where arms turn; see `energy_impulse.rs`.
 #[test]
 fn energy_never_grows_where_springs_let_go_what_meets() {
     for restitution in [0.0, 0.6, 1.0] {

@@ -1,4 +1,4 @@
-//! What comes back of an impact: the share of its energy that the scene says, at any rate.
+//! Energy that comes back of an impact: the share of its energy that the scene says, at any rate.
 #![allow(non_snake_case)]
 
 use crate::common;

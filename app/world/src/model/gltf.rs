@@ -1,8 +1,8 @@
 //! glTF 2.0: `.gltf` with its buffers within or beside it, and `.glb`.
 //!
 //! Read: of the file's scene (the one that it names, else the first; all nodes if it has none) the meshes of all nodes, each
-//! where its node and those above put it, as one soup (of a file in which no node shows a mesh, all meshes as they are:
-//! a library of them); triangles, strips and fans, with and without indices; sparse
+//! put there by its node and those above, as one soup (of a file in which no node shows a mesh, all meshes as they are: a
+//! library of them); triangles, strips and fans, with and without indices; sparse
 //! accessors; positions as floats or quantised (`KHR_mesh_quantization`); names; for whoever draws it, base colours and their
 //! textures (`materials`). Metres, y up, as in a scene of ours. Passed over: cameras, lights, animations, skins and morph
 //! targets (the shape is that at rest), points and lines.
