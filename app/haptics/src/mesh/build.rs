@@ -58,6 +58,7 @@ impl Mesh {
         let mut triangles = repair::proper_triangles(&soup, &mut report)?;
         order::sort_spatially(&mut triangles, &soup.vertices, &mut report.duplicate);
         let mut vertices = order::renumber(&mut triangles, &soup.vertices);
+        let faces_before = soup.faces.len();
         drop(soup);
         let mut links = topology::link(&triangles, &vertices, &mut report)?;
         let mut room = (3 * triangles.len()).min(Link::MAX_FACES - triangles.len());
@@ -76,6 +77,9 @@ impl Mesh {
         }
         let copies = pinch::part(&mut triangles, &links, &mut vertices);
         if fold::unfold(&mut triangles, &links, &vertices, &copies, &mut report.unfolded) {
+            if triangles.is_empty() {
+                return Err(MeshError::OnlySlivers { faces: faces_before });
+            }
             let told = report;
             links = link_again(&mut triangles, &mut vertices, &mut report)?;
             parts = winding::orient(&mut triangles, &mut links, &mut report);

@@ -38,6 +38,11 @@ pub enum MeshError {
         /// How many faces there were.
         faces: usize,
     },
+    /// Every face that has an area was a sliver upon another one.
+    OnlySlivers {
+        /// How many faces there were.
+        faces: usize,
+    },
     /// Not as many triples of texture coordinates as faces.
     UvNumber {
         /// How many triples there are.
@@ -90,6 +95,11 @@ impl fmt::Display for MeshError {
                 f,
                 "none of the {faces} faces has an area; allowed is a mesh with at least one proper triangle: was \
                  it scaled to nothing?"
+            ),
+            Self::OnlySlivers { faces } => write!(
+                f,
+                "the {faces} faces are slivers that lie upon each other, with nothing between; allowed is a mesh with at \
+                 least one proper triangle: was it scaled to nothing?"
             ),
             Self::UvNumber { found, faces } => write!(
                 f,

@@ -2,7 +2,7 @@
 
 use crate::common::meshes::*;
 use crate::common::*;
-use haptics::mesh::{Mesh, MeshReport, Sides, TriangleSoup, make};
+use haptics::mesh::{Mesh, MeshError, MeshReport, Sides, TriangleSoup, make};
 use haptics::{Entity, Friction};
 use nalgebra::Vector3;
 use std::sync::Arc;
@@ -46,6 +46,33 @@ fn a_sliver_that_is_folded_over_its_neighbour_is_unfolded() {
         let (_, report) = folded(off_m, 0.1);
         assert_eq!(report.unfolded.count, 0, "{off_m}: {report}");
     }
+}
+
+/// One alone is no mesh, and beside a body it is left out, or one side of it.
+#[test]
+fn what_is_nothing_but_a_double_sliver_vanishes() {
+    let vertices = [[0.0, 0.0, 0.0], [0.0, 1e-5, 7e-7], [2e-9, 0.0, 0.0], [0.0, -0.03, 0.0]];
+    let mut vanished = 0;
+    for mirrored in 0..8 {
+        let sign = |axis: usize| if mirrored >> axis & 1 == 0 { 1.0 } else { -1.0 };
+        let vertices: Vec<_> = vertices.map(|v| Vector3::from_fn(|axis, _| sign(axis) * v[axis])).into();
+        let sliver = TriangleSoup { vertices, faces: vec![[0, 1, 3], [1, 2, 3]] };
+        let mut beside = make::cuboid([0.05; 3]);
+        let first = beside.vertices.len() as u32;
+        beside.vertices.extend(sliver.vertices.iter().map(|vertex_B| vertex_B + Vector3::y()));
+        beside.faces.extend(sliver.faces.iter().map(|face| face.map(|corner| corner + first)));
+        let (mesh, report) = Mesh::build(beside).unwrap();
+        assert_eq!(report.unfolded.count, 1, "{mirrored}: {report}");
+        match Mesh::build(sliver) {
+            Ok((alone, _)) => assert_eq!((alone.faces().len(), mesh.faces().len()), (1, 13), "{mirrored}"),
+            Err(error) => {
+                assert_eq!((error, mesh.faces().len()), (MeshError::OnlySlivers { faces: 2 }, 12));
+                assert!(mesh.extent_m() < 0.051, "{mirrored}: {}", mesh.extent_m());
+                vanished += 1;
+            }
+        }
+    }
+    assert!(vanished > 0);
 }
 
 /// Its longest edge is one of the slab's rim, and it is folded over faces beside its others.
