@@ -245,21 +245,21 @@ impl Pair {
         }
     }
 
-    /// Takes what its impulses put in from what the tick took from the bodies (J): that the tick has not taken. For all pairs,
-    /// before any of them [settles](Self::settle).
+    /// Takes what its impulses put in from what the tick took from the bodies (J): that the tick has not taken. What is more is owed:
+    /// an impulse has pushed a body into the spring of another pair. For all pairs, before any of them [settles](Self::settle).
     pub(crate) fn take_impulses(&self, end: &End<'_>, spare_j: &mut [f64]) {
         if self.surfacing.response.restitution().is_none() {
             return;
         }
-        for row in self.rows(end.rows) {
-            let put_in_j = (row.force_W - self.of_spring_W(row)).dot(&velocity(row, end.motions)) * end.dt_s;
-            let mut left_j = put_in_j.max(0.0);
-            for body in [Some(row.body), row.other].into_iter().flatten() {
-                let part_j = left_j.min(spare_j[body].max(0.0));
-                spare_j[body] -= part_j;
-                left_j -= part_j;
-            }
+        let put_in_W = |row: &Row| (row.force_W - self.of_spring_W(row)).dot(&velocity(row, end.motions));
+        let mut left_j = self.rows(end.rows).iter().map(put_in_W).sum::<f64>().max(0.0) * end.dt_s;
+        let (body, other) = self.bodies;
+        for body in [Some(body), other].into_iter().flatten() {
+            let part_j = left_j.min(spare_j[body].max(0.0));
+            spare_j[body] -= part_j;
+            left_j -= part_j;
         }
+        spare_j[body] -= left_j;
     }
 
     /// Takes note of how the tick ended, and of which rows met in it after it had begun. `spare_j`: of each body what the tick itself

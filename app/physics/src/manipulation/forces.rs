@@ -90,7 +90,8 @@ impl Manipulation {
 /// What a tick took from a body (J), negative: what it gave: the work on it as the rows see it, with the velocities that they were
 /// solved for, less what its energy grew by.
 fn taken_j(body: &Body, motion: &Motion, gets: &Gets, dt_s: f64) -> f64 {
-    if gets.is_fixed {
+    // What flies freely falls exactly.
+    if gets.is_fixed || gets.is_free {
         return 0.0;
     }
     let along_j = 0.5 * body.mass.mass_kg * (motion.velocity_W - body.velocity_W).norm_squared();

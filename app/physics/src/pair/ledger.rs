@@ -30,11 +30,13 @@
 //!    never owes.
 //! 4. *Accounts begin empty*, unless somebody from outside has put one of both there ([`Pair::was_put`](super::Pair::was_put)):
 //!    not where a body has come by itself, however deep it is found.
+//! 5. *What impulses put in is owed*, beyond what the tick took: beside a spring an impulse may push the body into it, and the
+//!    spring holds that; on an arm that turns it may give a little (`tests/all/energy.rs`).
 //!
 //! So mechanical energy is never above what it began with and what was put in by more than what is owed at the time; and that is
 //! never forgiven. What is not in there: that axes turn under an angular momentum that stands still makes kinetic energy swing by
-//! itself (`integrator/midpoint.rs`). It holds for springs and the `implicit` integrator; impulses have a proof of their own
-//! (`restitution/bounce.rs`).
+//! itself (`integrator/midpoint.rs`). It holds for the `implicit` integrator; that impulses alone work on nothing is shown in
+//! `restitution/bounce.rs`.
 
 use crate::collide::MAX_POINTS;
 

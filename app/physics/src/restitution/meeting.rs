@@ -69,11 +69,10 @@ impl Meeting {
             let fall = |body: usize| (start.motions[body].velocity_W - start.bodies[body].velocity_W).norm();
             fall(row.body).max(fall(other)).max(CALM_M_S)
         });
-        // So slowly a spring takes it without a bounce that anybody sees; and who presses steadily comes nearer all the time.
-        let calm_m_s = if stop.is_always { calm_m_s } else { calm_m_s.max(SLOW_M_S) };
         let approaches = now_m_s < -calm_m_s;
         let is_held = anchor.is_pressed() && !anchor.approached && approaches;
-        anchor.approached = approaches;
+        // A spring that is pressed is pressed on, however fast.
+        anchor.approached = approaches && (stop.is_always || !is_held);
         let stops_m_s = match gap_m {
             gap_m if gap_m > 0.0 => -gap_m / start.dt_s,
             _ if stop.is_always => let_out_m_s(-gap_m, start.dt_s),
@@ -179,8 +178,6 @@ fn at_start(row: &Row, start: &Start<'_>) -> Vector3<f64> {
 
 /// Nearer has come down to where they touch \[m\]: what is stopped at 10 m/s is a part in a million of its tick's way short of it.
 const TOUCHES_M: f64 = 2e-8;
-/// Speed that a spring takes without more ado \[m/s\].
-const SLOW_M_S: f64 = 1e-4;
 /// What two bodies approach no faster with rests even without gravity \[m/s\]: what is stopped a million times harder than it
 /// moves has such a velocity left of 1 m/s.
 const CALM_M_S: f64 = 1e-6;

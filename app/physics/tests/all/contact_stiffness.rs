@@ -6,8 +6,8 @@ use crate::{common, meshes};
 use common::{G, body, floor, object};
 use haptics::{Cuboid, Entity, Sphere};
 use nalgebra::{Isometry3, UnitQuaternion, Vector3};
-use physics::{Body, ContactStiffness, Manipulation, Settings};
-use std::f64::consts::{FRAC_PI_2, TAU};
+use physics::{Body, ContactStiffness, Manipulation, Response, Settings};
+use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
 const BY_MASS: ContactStiffness = ContactStiffness::ByMass { damping_ratio: 1.0 };
 /// [rad/s]: as the heaviest body would swing.
@@ -157,6 +157,59 @@ fn a_tower_of_forty_stands_and_sinks_by_a_sum() {
         let found_m = EDGE_M * (f64::from(place) + 0.5) - table.body(place as usize).centre_W.y;
         // Sixty of its slowest swings, critically damped, and roundings of numbers near 1.
         assert!((found_m - sunk_m).abs() < 1e-9, "{place}: {found_m} {sunk_m}");
+    }
+}
+
+/// What begins on the ground without having sunk in swings about its depth of rest as a damped spring does, whatever comes back
+/// of an impact: this is none.
+#[test]
+fn what_settles_on_its_spring_goes_beyond_its_rest_by_what_damping_leaves() {
+    let (mass_kg, k) = (0.1, 2e3);
+    for damping_ratio in [0.1, 0.3, 0.6] {
+        let overshoot = (-PI * damping_ratio / (1.0_f64 - damping_ratio * damping_ratio).sqrt()).exp();
+        let stiffness = ContactStiffness::Given { stiffness_n_per_m: k, damping_ratio };
+        for response in [Response::Force, Response::Bounce { restitution: 0.7 }] {
+            let settings = Settings { response, ..settings(stiffness) };
+            let mut table = Table::new(vec![(ball(0.02, 0.02), mass_kg)], settings, 8000.0);
+            let mut deepest_m = 0.0_f64;
+            for _ in 0..4000 {
+                table.run(1.0 / 8000.0);
+                deepest_m = deepest_m.max(0.02 - table.body(0).centre_W.y);
+            }
+            let found = deepest_m * k / (mass_kg * G) - 1.0;
+            // Implicit ticks damp by omega dt / 2 more: 0.009.
+            let less =
+                (-PI * (damping_ratio + 0.01) / (1.0 - (damping_ratio + 0.01_f64).powi(2)).sqrt()).exp();
+            assert!(
+                (less - 0.005..overshoot + 0.005).contains(&found),
+                "{damping_ratio} {response:?}: {found} {overshoot}"
+            );
+        }
+    }
+}
+
+/// A finger presses a cube down without weight: its spring takes the force, and no impulse.
+#[test]
+fn what_is_pressed_steadily_or_fast_is_held_by_its_spring() {
+    for restitution in [0.0, 0.7] {
+        let response = Response::Bounce { restitution };
+        let settings = Settings { response, gravity_W: Vector3::zeros(), ..settings(BY_MASS) };
+        let cube = cube(0.02, 0.01);
+        let bodies = [(1, body(&cube, 0.1))];
+        let mut world = common::World::new(vec![floor(0.0, 1000.0, 0.5), cube], &bodies, settings, 1);
+        let mut force_n = 0.0;
+        for tick in 0..2000 {
+            // Down by 5 mm at 0.1 m/s.
+            let down_m = (f64::from(tick) * 1e-4).min(5e-3);
+            force_n = world.step(&[Vector3::new(0.0, 0.0201 - down_m, 0.0)])[0].norm();
+        }
+        let depth_m = 0.01 - world.body().centre_W.y;
+        let expected_m = force_n / (4.0 * 0.1 * OMEGA.powi(2));
+        assert!(
+            force_n > 4.0 && (depth_m - expected_m).abs() < 1e-9,
+            "{restitution}: {force_n} N, {depth_m} {expected_m}"
+        );
+        assert!(world.body().velocity_W.norm() < 1e-9, "{restitution}: {}", world.body().velocity_W);
     }
 }
 

@@ -44,7 +44,7 @@ fn springs_j(row: &Row) -> f64 {
 /// An impulse stops velocities, not places: a point on an arm that turns is `omega^2 r dt^2` from where its velocity would have
 /// it (half of it for the arc, as much again for what the velocity changes by), and its force works along that. What is too deep
 /// is let out, against what presses.
-pub(crate) fn allowed_for_j(row: &Row, world: &World, before: &[Body]) -> f64 {
+fn allowed_for_j(row: &Row, world: &World, before: &[Body]) -> f64 {
     let arc_m = |body: usize| {
         let after = &world.manipulation.bodies()[body];
         let spin = before[body].angular_velocity_W().norm().max(after.angular_velocity_W().norm());
