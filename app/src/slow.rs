@@ -307,10 +307,12 @@ pub fn subscribe(recorders: &mut [Recorder], events: &mut Hub) {
 fn summary(events: &Hub) -> String {
     let mut line = String::new();
     for (class, word) in Class::ALL.into_iter().filter(|(class, _)| *class != Class::Lost) {
-        if events.count(class) > 0 {
+        let count = events.count(class);
+        if count > 0 {
             let comma = if line.is_empty() { "" } else { ", " };
+            let word = if count == 1 { word.trim_end_matches('s') } else { word };
             // A string takes everything.
-            let _ = write!(line, "{comma}{} {word}", events.count(class));
+            let _ = write!(line, "{comma}{count} {word}");
         }
     }
     if line.is_empty() {

@@ -194,11 +194,11 @@ impl Recipient for Desk<'_> {
             }
             ServerEvent::EmergencyStopRequested { pid, user, .. } => {
                 // As of now: who asked before to leave a fault did not know of it, whatever the clock of who stops says.
-                self.sender.urgent.stop(user, monotonic_ns());
-                say(
-                    self.options,
-                    format_args!("emergency stop, asked for by {} of {}", ProcessWords(pid), UserWords(user)),
-                );
+                let is_new = self.sender.urgent.stop(user, monotonic_ns());
+                let by = (ProcessWords(pid), UserWords(user));
+                if is_new {
+                    say(self.options, format_args!("emergency stop, asked for by {} of {}", by.0, by.1));
+                }
             }
             ServerEvent::ZeroRequested { pid, devices, .. } => {
                 self.post(Letter::Zero(DeviceSet(devices)))?;

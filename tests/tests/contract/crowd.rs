@@ -127,7 +127,7 @@ fn a_thing_that_a_finger_is_pushed_through_is_no_crowd() {
     );
     let said = place.run(["run", "scene.toml", "--hand", "hand.csv", "--clock", "virtual", "--headless"]);
     assert_eq!(said.status, Some(0), "{}", said.err);
-    assert!(said.out.contains("1 contacts") && !said.out.contains("crowded"), "{}", said.out);
+    assert!(said.out.contains(" 1 contact") && !said.out.contains("crowded"), "{}", said.out);
 }
 
 /// All at one place: nobody can look at them all within a tick. The finger comes into all of their boxes, and touches none.

@@ -36,9 +36,13 @@ fn ran(scene: &str, hand: &str, seconds: &str) -> (Workplace, Table, Table) {
 fn check_report(report: &str, events: &Table) {
     let line = report.lines().find_map(|line| line.strip_prefix("events       ")).expect("a line of events");
     for (class, kind) in
-        [("contacts", "contact-begin"), ("slips", "slip-begin"), ("pairs", "pair-begin"), ("grasps", "grasp")]
+        [("contact", "contact-begin"), ("slip", "slip-begin"), ("pair", "pair-begin"), ("grasp", "grasp")]
     {
-        let told = line.split(", ").find_map(|part| part.strip_suffix(class)?.trim().parse().ok());
+        let told = line.split(", ").find_map(|part| {
+            let (count, word) = part.split_once(' ')?;
+            let of_one = if count == "1" { word } else { word.strip_suffix('s')? };
+            if of_one == class { count.parse().ok() } else { None }
+        });
         assert_eq!(told.unwrap_or(0), of_kind(events, kind, "kind").len(), "{class} of: {line}");
     }
 }

@@ -131,11 +131,11 @@ pub(super) fn walk<L: FrictionLaw + ?Sized>(
         }
         (secant, longest) = (Secant::default(), f64::NAN);
     }
-    Some(if round.asked_m < 0.0 {
-        slider.went_too_far(&round, MAX_ROUNDS)
-    } else if round.asked_m == round.gap_m {
-        // Without friction.
+    Some(if round.asked_m == round.gap_m {
+        // Without friction, even beyond where it was to go.
         held_here(god, slider, MAX_ROUNDS)
+    } else if round.asked_m < 0.0 {
+        slider.went_too_far(&round, MAX_ROUNDS)
     } else {
         round.arrived(MAX_ROUNDS)
     })
