@@ -139,7 +139,9 @@ fn a_signal_ends_a_run_in_order_on_every_clock() {
             table.len(),
             said.out
         );
-        assert_eq!(table.texts("t")[0], "0.0", "{clock}");
+        let first_s: f64 = table.texts("t")[0].parse().expect("a number");
+        // In real time a busy machine may be late for the first ticks already.
+        assert!(first_s == 0.0 || clock == "real" && first_s < 1.0, "{clock}: {first_s}");
         assert_nothing_is_left(&place, &["out.csv", "scene.toml"]);
     }
 }

@@ -10,7 +10,7 @@
 //! that does not help, friction is [held](super::hold) to what the points were pressed with; then the points take some cautious
 //! turns one by one. Should all that find nothing (contact points many times farther from the centre than the mass itself
 //! is), what such turns leave stands, and is said to be unsolved.
-//! Cost: at most [`MAX_SWEEPS`] rounds of all ways together.
+//! Cost: at most [`MAX_SWEEPS`] rounds of all ways together, of large islands as many as [`MOST_PRODUCTS`] leave.
 
 use nalgebra::Vector3;
 
@@ -34,6 +34,8 @@ const MOST_LEAPS: usize = 8;
 const MOST_HELD: usize = 64;
 /// Rounds of Newton's steps at once.
 const MOST_ROUNDS: usize = 20;
+/// Of all rounds together, products of blocks: some milliseconds.
+const MOST_PRODUCTS: usize = 131_072;
 /// Turns of the points one by one: at first, and the most at once; each time twice as many.
 const FIRST_TURNS: usize = 8;
 const MOST_TURNS: usize = 512;
@@ -120,7 +122,9 @@ impl Newton {
     fn solve(&mut self, rows: &mut [Row], dt_s: f64) -> Solved {
         let Self { links, starts, now, next, best, change, blocks, holds_n } = self;
         let equations = Equations { links, starts, dt_s, holds_n: None };
-        let mut search = Search { equations, now, next, best, change, blocks, holds_n, rounds: 0 };
+        let most_rounds = (MOST_PRODUCTS / blocks.products().max(1)).clamp(1, MAX_SWEEPS);
+        let mut search =
+            Search { equations, now, next, best, change, blocks, holds_n, rounds: 0, most_rounds };
         search.run(rows)
     }
 }
@@ -135,6 +139,7 @@ struct Search<'a> {
     blocks: &'a mut Blocks,
     holds_n: &'a mut Vec<f64>,
     rounds: usize,
+    most_rounds: usize,
 }
 
 impl Search<'_> {
@@ -169,7 +174,7 @@ impl Search<'_> {
             if is_solved {
                 continue;
             }
-            if self.rounds >= MAX_SWEEPS || turns > self.most_turns() {
+            if self.rounds >= self.most_rounds || turns > self.most_turns() {
                 return false;
             }
             turns = (2 * turns).max(FIRST_TURNS);
@@ -180,7 +185,7 @@ impl Search<'_> {
 
     /// The way over friction that holds what was pressed before; says whether it leads to the answer.
     fn hold(&mut self, rows: &[Row]) -> bool {
-        let rounds = MOST_HELD.min(MAX_SWEEPS - self.rounds.min(MAX_SWEEPS));
+        let rounds = MOST_HELD.min(self.most_rounds.saturating_sub(self.rounds));
         let Self { equations, now, next, change, blocks, holds_n, .. } = self;
         self.rounds += Hold { now, next, change, blocks }.run(equations, rows, holds_n, rounds);
         self.approach(rows, 1.0)
@@ -212,7 +217,7 @@ impl Search<'_> {
         // One body alone finds its way without, and sooner.
         let most_leaps = if self.now.p.len() > 1 { MOST_LEAPS } else { 0 };
         let mut leaps = 0;
-        let most_rounds = MAX_SWEEPS.min(self.rounds + MOST_ROUNDS);
+        let most_rounds = self.most_rounds.min(self.rounds + MOST_ROUNDS);
         while self.rounds < most_rounds {
             self.rounds += 1;
             let was_j = self.now.left_j;

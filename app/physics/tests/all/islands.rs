@@ -342,31 +342,31 @@ fn a_stack_that_is_lifted_moves_as_what_lifts_it_gives() {
 
 #[test]
 fn islands_that_are_too_large_are_found_body_by_body_and_it_is_told_when_they_are_not() {
-    let (mut motions, mut rows) = stack(80, 0.0);
-    let solved = Solver::with_capacity(512, 80).solve(&mut rows, &mut motions, DT);
+    let (mut motions, mut rows) = stack(160, 0.0);
+    let solved = Solver::with_capacity(1024, 160).solve(&mut rows, &mut motions, DT);
     assert!(solved.unsolved == 1 && solved.residual > 1e-9, "{solved:?}");
     assert!(rows.iter().all(|row| row.force_W.y >= 0.0 && row.force_W.y.is_finite()));
     // One that starts with the right forces is found at once.
-    let (mut motions, mut rows) = stack(80, 0.0);
+    let (mut motions, mut rows) = stack(160, 0.0);
     rows.iter_mut().for_each(|row| row.force_W = row.rest_W);
-    let solved = Solver::with_capacity(512, 80).solve(&mut rows, &mut motions, DT);
+    let solved = Solver::with_capacity(1024, 160).solve(&mut rows, &mut motions, DT);
     assert!(solved.unsolved == 0, "{solved:?}");
     let weighs: f64 = rows[..4].iter().map(|row| row.force_W.y).sum();
     // What counts as found: a change of 1e-9 of a force.
-    assert!((weighs - 80.0 * 1e-3 * G).abs() < 1e-8, "{weighs}");
+    assert!((weighs - 160.0 * 1e-3 * G).abs() < 1e-8, "{weighs}");
 }
 
-/// 70 cubes whose springs and dampers are a hundred times softer: in turns, forces go from one to the next without much of an echo.
+/// 140 cubes whose springs and dampers are a hundred times softer: in turns, forces go from one to the next without much of an echo.
 #[test]
 fn turns_over_the_bodies_of_a_large_island_end_at_what_all_of_its_equations_ask_for() {
-    let (start, mut rows) = stack(70, 0.0);
+    let (start, mut rows) = stack(140, 0.0);
     for row in &mut rows {
         // From the lowest on, all is pressed unevenly at first.
         (row.stiffness, row.damping) = ([50.0; 2], [0.01; 2]);
         row.rest_W += Vector3::new(1e-4, 2e-3 * (row.body % 3) as f64, 0.0);
     }
     let mut motions = start.clone();
-    let solved = Solver::with_capacity(512, 70).solve(&mut rows, &mut motions, DT);
+    let solved = Solver::with_capacity(1024, 140).solve(&mut rows, &mut motions, DT);
     assert!(solved.unsolved == 0 && solved.sweeps > 3, "{solved:?}");
     for row in &rows {
         let own = motions[row.body].at(&row.arms_W[0]);
