@@ -58,6 +58,10 @@ pub struct Entity {
     pub restitution: Option<f64>,
     /// Of each point where another entity touches it \[N/m\], > 0; no finger feels it. `None`: nobody says.
     pub contact_stiffness_n_per_m: Option<f64>,
+    /// Torque about the normal, per normal force, up to which a contact with another entity does not spin \[m\]; no finger feels it.
+    pub torsional_friction_m: f64,
+    /// The like across the normal, up to which it does not roll \[m\].
+    pub rolling_friction_m: f64,
     /// How contacts with it are rendered.
     pub algorithm: Algorithm,
     /// Whether its facets feel smooth.
@@ -98,6 +102,8 @@ impl Entity {
             face_materials: None,
             restitution: None,
             contact_stiffness_n_per_m: None,
+            torsional_friction_m: 0.0,
+            rolling_friction_m: 0.0,
             algorithm: Algorithm::FrictionCone,
             shading: Shading::None,
             height_map: None,
@@ -130,6 +136,14 @@ impl Entity {
     pub fn with_contact_stiffness(self, stiffness_n_per_m: f64) -> Result<Self, ParameterError> {
         let stiffness_n_per_m = above_zero("contact_stiffness_n_per_m", stiffness_n_per_m)?;
         Ok(Self { contact_stiffness_n_per_m: Some(stiffness_n_per_m), ..self })
+    }
+
+    /// With this resistance to turning in its contacts with other entities: torsional friction (about the normal) and rolling
+    /// friction (across it) are that many times the normal force (m). Errors: a length that is not finite or negative.
+    pub fn with_turning_friction(self, torsional_m: f64, rolling_m: f64) -> Result<Self, ParameterError> {
+        let torsional_friction_m = at_least_zero("torsional_friction_m", torsional_m)?;
+        let rolling_friction_m = at_least_zero("rolling_friction_m", rolling_m)?;
+        Ok(Self { torsional_friction_m, rolling_friction_m, ..self })
     }
 
     /// Rendered by this algorithm.

@@ -25,6 +25,9 @@ pub struct Anchor {
     stretch: Vector3<f64>,
     /// Force on the body in the last tick \[N\], in the other's frame.
     force: Vector3<f64>,
+    /// How far the body has been turned against its torsional and rolling friction, at the rim of their patch \[m\]; in the
+    /// other's frame, at the end of the tick.
+    turned: Vector3<f64>,
     /// Whether it stuck or slid.
     held: Held,
     /// It came nearer when the last tick began, fast enough to bounce.
@@ -37,9 +40,9 @@ pub struct Anchor {
     pub(crate) pressed_m: f64,
     /// Which part of a spring it is.
     pub(crate) share: f64,
-    /// How far its springs were stretched when the last tick ended, along the normal and across it \[m^2\], squared: what the
-    /// forces have worked against.
-    pub(crate) worked: [f64; 2],
+    /// How far its springs were stretched when the last tick ended, along the normal, across it and in turning \[m^2\], squared:
+    /// what the forces have worked against.
+    pub(crate) worked: [f64; 3],
 }
 
 impl Anchor {
@@ -116,6 +119,27 @@ impl Anchor {
         X_WB.rotation * self.force
     }
 
+    /// How far the body has been turned, in W \[m\].
+    pub(crate) fn turned_W(&self, X_WB: &Isometry3<f64>) -> Vector3<f64> {
+        X_WB.rotation * self.turned
+    }
+
+    /// How far it has been turned \[m^2\], squared.
+    pub(crate) fn turned_squared(&self) -> f64 {
+        self.turned.norm_squared()
+    }
+
+    /// Lets go of what it was turned by, but for this part.
+    pub(crate) fn turn_back(&mut self, share: f64) {
+        self.turned *= share;
+    }
+
+    /// Remembers how far it has been turned when the tick ended (m, in W).
+    pub(crate) fn turn(&mut self, turned_W: &Vector3<f64>, X_WB: &Isometry3<f64>) {
+        self.turned = X_WB.inverse_transform_vector(turned_W);
+        self.worked[2] = self.turned.norm_squared();
+    }
+
     pub(crate) fn held(&self) -> Held {
         self.held
     }
@@ -148,8 +172,8 @@ impl Anchor {
         let pressed_m = (self.pressed_m - n.dot(moved_W)).max(0.0);
         let dragged_W = self.stretch_W(X_WB) + moved_W - n * n.dot(moved_W);
         let is_dragged = normal_n > 0.0;
-        self.worked =
-            [self.share * pressed_m * pressed_m, if is_dragged { dragged_W.norm_squared() } else { 0.0 }];
+        self.worked[0] = self.share * pressed_m * pressed_m;
+        self.worked[1] = if is_dragged { dragged_W.norm_squared() } else { 0.0 };
         self.held = match row.held {
             Held::Slip if normal_n > 0.0 && is_caught(row, normal_n) => Held::Stick,
             Held::Slip if normal_n == 0.0 => Held::Stick,

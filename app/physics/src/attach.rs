@@ -17,7 +17,7 @@ use nalgebra::{Isometry3, Point3, UnitQuaternion, Vector3};
 use crate::body::Body;
 use crate::gimbal::is_orientation;
 use crate::mass::positive;
-use crate::row::{Held, Row, Torsion};
+use crate::row::{Held, Rolling, Row, Torsion};
 
 /// How an attached object turns.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -203,6 +203,7 @@ impl Bond {
             held: Held::Stick,
             force_W: self.force_W,
             torsion: Torsion::default(),
+            rolling: Rolling::default(),
             tie_n: Some(most_n),
         }
     }

@@ -177,7 +177,7 @@ fn residual(rows: &[Row], body: usize, weight_W: &Vector3<f64>, length_m: f64) -
     for row in rows {
         let sides = [(Some(row.body), 1.0), (row.other, -1.0)];
         for ((_, sign), arm_W) in sides.iter().zip(&row.arms_W).filter(|((side, _), _)| *side == Some(body)) {
-            let (force_W, torsion_W) = (row.force_W * *sign, row.normal_W * (row.torsion.torque_nm * *sign));
+            let (force_W, torsion_W) = (row.force_W * *sign, row.torque_W() * *sign);
             total.add(&force_W, arm_W);
             total.torque_W += torsion_W;
             sizes += force_W.norm() + torsion_W.norm() / length_m;

@@ -70,7 +70,7 @@ pub use pair::{Response, Surfacing};
 pub use pair_friction::PairFriction;
 pub use pull::{MAX_PULLS, Pull};
 pub use roster::Standing;
-pub use row::{Held, Row, Torsion};
+pub use row::{Held, Rolling, Row, Torsion};
 pub use settings::Settings;
 pub use sleep::Sleep;
 pub use soft_finger::{SoftFinger, TorsionModel};

@@ -7,6 +7,7 @@ mod crossing;
 mod ledger;
 mod pressed;
 mod surfacing;
+mod turning;
 
 use haptics::Entity;
 use nalgebra::{Isometry3, Vector3};
@@ -18,11 +19,11 @@ use crate::collide::{
     ContactPoint, ContactPoints, MAX_POINTS, PairMemory, Solid, bounding_ball, contact_points,
 };
 use crate::pairs::Who;
-use crate::restitution::{Meeting, Stop, velocity};
+use crate::restitution::{Meeting, Stop, spin_W, velocity};
 use crate::row::Row;
 use crate::solver::Motion;
 pub(crate) use crossing::{ANCHORS_AT_ONCE, Head};
-use ledger::{Allowed, Ledger, MAX_SPRINGS, Stretched};
+use ledger::{Allowed, Ledger, MAX_SPRINGS, SPRINGS_OF_POINT, Stretched};
 pub(crate) use pressed::HARD;
 pub(crate) use pressed::let_out_m_s;
 use pressed::row;
@@ -139,6 +140,11 @@ impl Pair {
         let poses = [[&a.X_WB, &b.X_WB], [&a.previous_X_WB, &b.previous_X_WB]];
         let begins = self.count == 0;
         self.carry(&found, poses, reach_m, speed_m_s * start.dt_s, last);
+        let pressed = self.anchors[..self.count].iter().filter(|anchor| anchor.is_pressed()).count();
+        let resists_turning = pressed <= turning::MOST_POINTS;
+        if !resists_turning {
+            self.anchors[..self.count].iter_mut().for_each(|anchor| anchor.turn_back(0.0));
+        }
         // A contact that is not found for a tick may still be there: until then the account stays.
         if self.count > 0 {
             self.press(found.as_slice(), begins, start);
@@ -148,7 +154,10 @@ impl Pair {
             if rows.len() == rows.capacity() {
                 break;
             }
-            let (row, stop_n_s_per_m) = row(self.bodies, &self.surfacing, anchor, point, &b.X_WB, start);
+            let (mut row, stop_n_s_per_m) = row(self.bodies, &self.surfacing, anchor, point, &b.X_WB, start);
+            if resists_turning {
+                turning::resist(&mut row, &self.surfacing, &anchor.turned_W(&b.X_WB), start);
+            }
             let response = self.surfacing.response;
             if let Some(restitution) = response.restitution() {
                 let stop = Stop { n_s_per_m: stop_n_s_per_m, is_always: !response.has_springs() };
@@ -173,12 +182,14 @@ impl Pair {
             is_let_out |= anchor.granted_m > 0.0;
             anchor.pressed_m = if point.gap_m < 0.0 { depth_m - anchor.granted_m } else { -point.gap_m };
             anchor.share = point.share;
-            let dragged = anchor.stretch_squared();
-            springs[2 * at + 1] = Stretched { found: dragged, worked: anchor.worked[1] };
-            full += dragged;
+            let first = SPRINGS_OF_POINT * at;
+            let [dragged, turned] = [anchor.stretch_squared(), anchor.turned_squared()];
+            springs[first + 1] = Stretched { found: dragged, worked: anchor.worked[1] };
+            springs[first + 2] = Stretched { found: turned, worked: anchor.worked[2] };
+            full += dragged + turned;
             if has_springs {
                 let found = point.share * anchor.pressed_m.max(0.0).powi(2);
-                springs[2 * at] = Stretched { found, worked: anchor.worked[0] };
+                springs[first] = Stretched { found, worked: anchor.worked[0] };
                 full += point.share * depth_m * depth_m;
             }
         }
@@ -188,16 +199,19 @@ impl Pair {
             self.ledger = Ledger::of(full_j);
         }
         self.ledger.cut(full_j, is_let_out);
-        let springs = &springs[..2 * points.len().min(MAX_POINTS)];
+        let springs = &springs[..SPRINGS_OF_POINT * points.len().min(MAX_POINTS)];
         let allowed = self.ledger.allow(springs, k, is_let_out);
         if allowed == Allowed::Everything || !start.is_implicit {
             return;
         }
-        for (anchor, springs) in self.anchors.iter_mut().zip(springs.chunks_exact(2)) {
+        for (anchor, springs) in self.anchors.iter_mut().zip(springs.chunks_exact(SPRINGS_OF_POINT)) {
             if has_springs && anchor.pressed_m > 0.0 {
                 anchor.pressed_m *= (allowed.of(&springs[0]) / springs[0].found).sqrt().min(1.0);
             }
             anchor.slacken(allowed.of(&springs[1]));
+            if springs[2].found > 0.0 {
+                anchor.turn_back((allowed.of(&springs[2]) / springs[2].found).sqrt().min(1.0));
+            }
         }
     }
 
@@ -280,11 +294,13 @@ impl Pair {
                 anchor.release();
             }
             anchor.settle(row, &(velocity_W * end.dt_s), X_WB);
+            turning::settle(row, anchor, &(spin_W(row, end.motions) * end.dt_s), X_WB);
         }
         for row in self.rows(end.rows) {
             let force_W = self.of_spring_W(row);
             presses |= force_W != Vector3::zeros();
             worked_j += force_W.dot(&velocity(row, end.motions)) * end.dt_s;
+            worked_j += row.torque_W().dot(&spin_W(row, end.motions)) * end.dt_s;
         }
         self.ledger.enter(worked_j);
         let moves = |body: &usize| end.motions[*body].is_movable();

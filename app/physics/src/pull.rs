@@ -7,7 +7,7 @@
 
 use nalgebra::Vector3;
 
-use crate::row::{Held, Row, Torsion};
+use crate::row::{Held, Rolling, Row, Torsion};
 use crate::solver::Motion;
 
 /// A force between a finger and a body, in the world frame.
@@ -60,6 +60,7 @@ impl Pull {
             held: Held::Slip,
             force_W,
             torsion: Torsion::default(),
+            rolling: Rolling::default(),
             tie_n: None,
         };
         let velocity_W = motion.at(&arm_W);

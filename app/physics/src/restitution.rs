@@ -96,6 +96,12 @@ impl Restitution {
     }
 }
 
+/// Angular velocity of the body relative to the other.
+pub(crate) fn spin_W(row: &Row, motions: &[Motion]) -> Vector3<f64> {
+    let own_W = motions[row.body].angular_velocity_W;
+    row.other.map_or(own_W, |other| own_W - motions[other].angular_velocity_W)
+}
+
 /// Velocity of the body's point relative to the other's.
 pub(crate) fn velocity(row: &Row, motions: &[Motion]) -> Vector3<f64> {
     let own_W = motions[row.body].at(&row.arms_W[0]);

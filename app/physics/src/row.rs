@@ -35,6 +35,8 @@ pub struct Row {
     pub force_W: Vector3<f64>,
     /// What of its turning about the normal the contact resists.
     pub torsion: Torsion,
+    /// What of its rolling.
+    pub rolling: Rolling,
     /// A tie, not a contact: it pulls as well as it presses, in every direction up to this force \[N\]; there is no cone.
     pub tie_n: Option<f64>,
 }
@@ -97,6 +99,60 @@ impl Torsion {
     }
 }
 
+/// Resistance of a contact point to rolling, which is turning across its normal: a spring with damper and limit, as torsion.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Rolling {
+    /// Torque on the body, across the normal, if it does not turn \[N m\].
+    pub rest_W: Vector3<f64>,
+    /// \[N m/rad\]
+    pub stiffness_nm_per_rad: f64,
+    /// \[N m s/rad\]
+    pub damping_nm_s_per_rad: f64,
+    /// The torque is no larger \[N m\]; 0: none.
+    pub most_nm: f64,
+    /// At first a guess, then the answer \[N m\].
+    pub torque_W: Vector3<f64>,
+}
+
+impl Rolling {
+    /// By how much the trial torque falls per angular velocity that lasts for the tick \[N m s\].
+    #[inline]
+    pub(crate) fn falls(&self, dt_s: f64) -> f64 {
+        self.stiffness_nm_per_rad * dt_s + self.damping_nm_s_per_rad
+    }
+
+    /// Makes the guess one that it can have.
+    #[inline]
+    pub(crate) fn begin(&mut self) {
+        self.torque_W = within_ball(&self.torque_W, self.most_nm);
+    }
+
+    /// The torque if the body turns at `across_W` (rad/s), across the normal, all the tick \[N m\].
+    #[inline]
+    pub(crate) fn at_end_W(&self, across_W: &Vector3<f64>, dt_s: f64) -> Vector3<f64> {
+        within_ball(&(self.rest_W - across_W * self.falls(dt_s)), self.most_nm)
+    }
+
+    /// By how much that torque falls per angular velocity, where it stands \[N m s\]; `normal_W` is the contact's.
+    #[inline]
+    pub(crate) fn falls_at_end_W(
+        &self,
+        normal_W: &Vector3<f64>,
+        across_W: &Vector3<f64>,
+        dt_s: f64,
+    ) -> Matrix3<f64> {
+        let plane = Matrix3::identity() - normal_W * normal_W.transpose();
+        let falls = self.falls(dt_s);
+        let trial_W = self.rest_W - across_W * falls;
+        let trial_nm = trial_W.norm();
+        if trial_nm <= self.most_nm {
+            return plane * falls;
+        }
+        let t = trial_W / trial_nm;
+        (plane - t * t.transpose()) * (falls * self.most_nm / trial_nm)
+    }
+}
+
 /// What friction does at a contact point.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Held {
@@ -135,8 +191,21 @@ impl Row {
             held: Held::Stick,
             force_W: Vector3::zeros(),
             torsion,
+            rolling: Rolling::default(),
             tie_n: None,
         }
+    }
+
+    /// The torque on the body, beside that of the force \[N m\].
+    #[inline]
+    pub(crate) fn torque_W(&self) -> Vector3<f64> {
+        self.normal_W * self.torsion.torque_nm + self.rolling.torque_W
+    }
+
+    /// Without a force and a torque.
+    pub(crate) fn silence(&mut self) {
+        self.force_W = Vector3::zeros();
+        (self.torsion.torque_nm, self.rolling.torque_W) = (0.0, Vector3::zeros());
     }
 
     /// The force: what of a trial force does not pull and lies in the cone; of a tie, what is not too much.
@@ -166,8 +235,9 @@ impl Row {
 
     /// Whether all of it is made of numbers, and springs and dampers take energy rather than give it.
     pub(crate) fn is_finite(&self) -> bool {
-        let vectors = [&self.arms_W[0], &self.arms_W[1], &self.normal_W, &self.rest_W, &self.force_W];
-        let torsion = &self.torsion;
+        let (torsion, rolling) = (&self.torsion, &self.rolling);
+        let [a_W, b_W] = &self.arms_W;
+        let vectors = [a_W, b_W, &self.normal_W, &self.rest_W, &self.force_W, &rolling.rest_W];
         let not_negative = [
             self.stiffness[0],
             self.stiffness[1],
@@ -178,6 +248,9 @@ impl Row {
             torsion.stiffness_nm_per_rad,
             torsion.damping_nm_s_per_rad,
             torsion.most_nm,
+            rolling.stiffness_nm_per_rad,
+            rolling.damping_nm_s_per_rad,
+            rolling.most_nm,
         ];
         vectors.iter().all(|v| v.iter().all(|x| x.is_finite()))
             && not_negative.iter().all(|x| x.is_finite() && *x >= 0.0)
@@ -288,7 +361,7 @@ impl Row {
 }
 
 /// A force, cut to this length; one that is no number is none.
-fn within_ball(force_W: &Vector3<f64>, most_n: f64) -> Vector3<f64> {
+pub(crate) fn within_ball(force_W: &Vector3<f64>, most_n: f64) -> Vector3<f64> {
     let length_n = force_W.norm();
     if length_n <= most_n {
         *force_W

@@ -26,8 +26,6 @@ mod relax;
 mod six;
 mod together;
 
-use nalgebra::Vector3;
-
 use crate::row::{Held, Row};
 pub use island::Islands;
 pub use motion::Motion;
@@ -109,7 +107,7 @@ impl Solver {
         let (rows, beyond) = rows.split_at_mut(self.room[0].min(rows.len()));
         let bodies = self.room[1].min(motions.len());
         let motions = &mut motions[..bodies];
-        beyond.iter_mut().for_each(silence);
+        beyond.iter_mut().for_each(Row::silence);
         self.sort(rows, motions);
         let Self { islands, order, starts, places, newton, together, .. } = self;
         let mut solved = Solved::default();
@@ -129,7 +127,7 @@ impl Solver {
             };
             solved = solved.and(of_island);
         }
-        order[starts[islands.iter().len()]..].iter().for_each(|&at| silence(&mut rows[at]));
+        order[starts[islands.iter().len()]..].iter().for_each(|&at| rows[at].silence());
         solved
     }
 
@@ -180,11 +178,6 @@ fn is_alone(rows: &[Row], which: &[usize], motions: &[Motion]) -> bool {
 fn is_sound(row: &Row, motions: &[Motion]) -> bool {
     let exists = |body: usize| motions.get(body).is_some_and(Motion::is_finite);
     exists(row.body) && row.other.is_none_or(|other| other != row.body && exists(other)) && row.is_finite()
-}
-
-fn silence(row: &mut Row) {
-    row.force_W = Vector3::zeros();
-    row.torsion.torque_nm = 0.0;
 }
 
 /// Where stiction is at its limit it breaks; says whether sliding takes another force than holding did.

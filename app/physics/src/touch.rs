@@ -11,7 +11,7 @@ use haptics::{
 };
 use nalgebra::Vector3;
 
-use crate::row::{Held, Row, Torsion};
+use crate::row::{Held, Rolling, Row, Torsion};
 use crate::solver::Motion;
 
 /// One point at which a finger touches a body, in the world frame.
@@ -90,6 +90,7 @@ impl Touch {
             held,
             force_W,
             torsion: Torsion::default(),
+            rolling: Rolling::default(),
             tie_n: None,
         };
         let velocity_W = motion.at(&arm_W);

@@ -74,7 +74,7 @@ impl Manipulation {
     pub(super) fn sum_up(&mut self) {
         self.gets.iter_mut().for_each(|gets| gets.is_free = true);
         for row in &self.rows {
-            let torque_W = row.normal_W * row.torsion.torque_nm;
+            let torque_W = row.torque_W();
             let sides = [(Some(row.body), 1.0), (row.other, -1.0)];
             for ((body, sign), arm_W) in sides.into_iter().zip(&row.arms_W) {
                 let Some(body) = body else { continue };

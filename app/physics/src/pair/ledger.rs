@@ -164,8 +164,9 @@ impl Allowed {
     }
 }
 
-/// Along the normal and across it.
-pub(super) const MAX_SPRINGS: usize = 2 * MAX_POINTS;
+/// Along the normal, across it and in turning.
+pub(super) const MAX_SPRINGS: usize = SPRINGS_OF_POINT * MAX_POINTS;
+pub(super) const SPRINGS_OF_POINT: usize = 3;
 /// Of sums of so many squares.
 const ROUNDING: f64 = 1e-14;
 

@@ -8,7 +8,7 @@ use nalgebra::{Isometry3, UnitQuaternion, Vector3};
 use super::{Response, Start, Surfacing};
 use crate::anchor::Anchor;
 use crate::collide::ContactPoint;
-use crate::row::{Row, Torsion};
+use crate::row::{Rolling, Row, Torsion};
 use crate::solver::Motion;
 
 /// The row of a point; and the damping along its normal that stops what it presses \[N s/m\].
@@ -51,6 +51,7 @@ pub(super) fn row(
         held: anchor.held(),
         force_W: anchor.force_W(X_WB),
         torsion: Torsion::default(),
+        rolling: Rolling::default(),
         tie_n: None,
     };
     let is_asked_for = surfacing.damping.is_ratio() || surfacing.response.restitution().is_some();

@@ -49,6 +49,8 @@ pub struct Surfacing {
     pub friction: PairFriction,
     /// How it answers.
     pub response: Response,
+    /// Torsional friction and rolling friction: torques per normal force, about the normal and across it \[m\].
+    pub turning_m: [f64; 2],
 }
 
 impl Surfacing {
@@ -65,6 +67,11 @@ impl Surfacing {
             damping,
             friction: PairFriction::between(&a.friction, &b.friction),
             response: contacts.response(a, b),
+            // What gives way more has the larger patch.
+            turning_m: [
+                a.torsional_friction_m.max(b.torsional_friction_m),
+                a.rolling_friction_m.max(b.rolling_friction_m),
+            ],
         }
     }
 }

@@ -24,7 +24,8 @@ use crate::solver::{Motion, Solved, Solver};
 pub(super) struct Bounce {
     freely: Vec<Motion>,
     bouncing: Vec<Motion>,
-    forces: Vec<(Vector3<f64>, f64)>,
+    /// Of each row: force, torques of torsion and of rolling.
+    forces: Vec<(Vector3<f64>, f64, Vector3<f64>)>,
     /// Of each body, how much of the bounce it gets.
     shares: Vec<f64>,
     /// What gravity changes velocities by in the tick \[m/s\].
@@ -82,7 +83,7 @@ impl Bounce {
         self.bouncing.clear();
         self.bouncing.extend_from_slice(motions);
         self.forces.clear();
-        self.forces.extend(rows.iter().map(|row| (row.force_W, row.torsion.torque_nm)));
+        self.forces.extend(rows.iter().map(|row| (row.force_W, row.torsion.torque_nm, row.rolling.torque_W)));
         motions.copy_from_slice(&self.freely);
         for &at in impulses.impacts {
             let row = &mut rows[at];
@@ -157,10 +158,11 @@ impl Bounce {
     }
 
     fn mix(&self, rows: &mut [Row], motions: &mut [Motion]) {
-        for (row, (force_W, torque_nm)) in rows.iter_mut().zip(&self.forces) {
+        for (row, (force_W, torque_nm, rolling_W)) in rows.iter_mut().zip(&self.forces) {
             let share = self.shares[row.body];
             row.force_W += (force_W - row.force_W) * share;
             row.torsion.torque_nm += (torque_nm - row.torsion.torque_nm) * share;
+            row.rolling.torque_W += (rolling_W - row.rolling.torque_W) * share;
         }
         for ((motion, bouncing), share) in motions.iter_mut().zip(&self.bouncing).zip(&self.shares) {
             motion.velocity_W += (bouncing.velocity_W - motion.velocity_W) * *share;

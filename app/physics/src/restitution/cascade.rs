@@ -15,7 +15,7 @@ use nalgebra::Vector3;
 
 use super::{Bounce, Impulses, Meeting, velocity};
 use crate::pair::HARD;
-use crate::row::{Row, Torsion};
+use crate::row::Row;
 use crate::solver::{Motion, Solver};
 
 /// The most pairs that meet in a tick.
@@ -130,7 +130,7 @@ impl Cascade {
             let was = &rows[meeting.row];
             let n = was.normal_W;
             let mut row = Row { body: 0, other: other.map(|_| 1), force_W: Vector3::zeros(), ..*was };
-            row.torsion = Torsion::default();
+            (row.torsion, row.rolling) = Default::default();
             let leaves_m_s = meeting.leaves_m_s(dt_s);
             // What is stopped gives way by a part in so many: that much more is asked for.
             let freely_m_s = n.dot(&velocity(was, motions));

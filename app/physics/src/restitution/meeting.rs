@@ -69,6 +69,8 @@ impl Meeting {
             let fall = |body: usize| (start.motions[body].velocity_W - start.bodies[body].velocity_W).norm();
             fall(row.body).max(fall(other)).max(CALM_M_S)
         });
+        // So slowly a spring takes it without a bounce that anybody sees; beside a wall gravity calms nothing.
+        let calm_m_s = if stop.is_always { calm_m_s } else { calm_m_s.max(SLOW_M_S) };
         let approaches = now_m_s < -calm_m_s;
         let is_held = anchor.is_pressed() && !anchor.approached && approaches;
         // A spring that is pressed is pressed on, however fast.
@@ -178,6 +180,8 @@ fn at_start(row: &Row, start: &Start<'_>) -> Vector3<f64> {
 
 /// Nearer has come down to where they touch \[m\]: what is stopped at 10 m/s is a part in a million of its tick's way short of it.
 const TOUCHES_M: f64 = 2e-8;
+/// Speed that a spring takes without more ado \[m/s\].
+const SLOW_M_S: f64 = 1e-4;
 /// What two bodies approach no faster with rests even without gravity \[m/s\]: what is stopped a million times harder than it
 /// moves has such a velocity left of 1 m/s.
 const CALM_M_S: f64 = 1e-6;

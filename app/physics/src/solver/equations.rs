@@ -67,7 +67,7 @@ impl Equations<'_> {
         for link in self.links {
             let row = &rows[link.row];
             for (side, place) in link.inside() {
-                trial.p[place] += on_side(row, side, &row.force_W, row.torsion.torque_nm);
+                trial.p[place] += on_side(row, side, &row.force_W, &row.torque_W());
             }
         }
         trial.p.iter_mut().for_each(|p| *p *= self.dt_s);
@@ -99,21 +99,22 @@ impl Equations<'_> {
                 None => row.at_end_W(&velocity_W, self.dt_s),
                 Some(holds_n) => row.at_end_within_W(&velocity_W, self.dt_s, holds_n[at]),
             };
-            let twist_nm = match row.torsion.most_nm {
-                0.0 => 0.0,
-                _ => row.torsion.at_end_nm(link.spin_rad_s(row, moving), self.dt_s),
-            };
+            let torque_W = self.torque_at_end_W(link, row, moving);
             for (side, place) in link.inside() {
-                left[place] -= on_side(row, side, &force_W, twist_nm);
+                left[place] -= on_side(row, side, &force_W, &torque_W);
             }
             let gives = link.most_give(row, moving);
             let [along, across] = row.falls(self.dt_s);
             let rounding_n = ROUNDING * along.max(across) * link.speed_m_s(row, moving);
             all += force_W.norm_squared() * gives;
-            if twist_nm != 0.0 {
-                all += twist_nm * twist_nm * link.most_turn(moving);
-            }
             noise += rounding_n * rounding_n * gives;
+            if has_torque(row) {
+                let turns = link.most_turn(moving);
+                let falls = row.torsion.falls(self.dt_s).max(row.rolling.falls(self.dt_s));
+                let rounding_nm = ROUNDING * falls * link.most_spin_rad_s(moving);
+                all += torque_W.norm_squared() * turns;
+                noise += rounding_nm * rounding_nm * turns;
+            }
         }
         let acts_s = self.dt_s * load;
         trial.left_j = 0.0;
@@ -141,12 +142,17 @@ impl Equations<'_> {
                 None => row.falls_at_end_W(&velocity_W, self.dt_s),
                 Some(holds_n) => row.falls_within_W(&velocity_W, self.dt_s, holds_n[at]),
             };
-            let twists = match row.torsion.most_nm {
-                0.0 => 0.0,
-                _ if chords => row.torsion.chord(link.spin_rad_s(row, moving), self.dt_s),
-                _ => row.torsion.falls_at_end(link.spin_rad_s(row, moving), self.dt_s),
-            };
-            link.add_falls(row, &falls, twists, blocks);
+            let turns = has_torque(row).then(|| {
+                let spin_rad_s = link.spin_rad_s(row, moving);
+                let twists = match chords {
+                    true => row.torsion.chord(spin_rad_s, self.dt_s),
+                    false => row.torsion.falls_at_end(spin_rad_s, self.dt_s),
+                };
+                let n = &row.normal_W;
+                let rolls_W = link.rolls_W(row, moving);
+                n * n.transpose() * twists + row.rolling.falls_at_end_W(n, &rolls_W, self.dt_s)
+            });
+            link.add_falls(row, &falls, turns.as_ref(), blocks);
         }
         let acts_s = self.dt_s * load;
         blocks.for_each(|row, column, block| {
@@ -170,7 +176,18 @@ impl Equations<'_> {
             let row = &mut rows[link.row];
             row.force_W = row.at_end_W(&link.velocity_W(row, moving), self.dt_s);
             row.torsion.torque_nm = row.torsion.at_end_nm(link.spin_rad_s(row, moving), self.dt_s);
+            row.rolling.torque_W = row.rolling.at_end_W(&link.rolls_W(row, moving), self.dt_s);
         }
+    }
+
+    /// The row's torque beside that of its force.
+    #[inline]
+    fn torque_at_end_W(&self, link: &Link, row: &Row, moving: &[Motion]) -> Vector3<f64> {
+        if !has_torque(row) {
+            return Vector3::zeros();
+        }
+        let twist_nm = row.torsion.at_end_nm(link.spin_rad_s(row, moving), self.dt_s);
+        row.normal_W * twist_nm + row.rolling.at_end_W(&link.rolls_W(row, moving), self.dt_s)
     }
 
     /// Of two sets of impulses, by their kinetic energy \[J\]: `a W b`.
@@ -190,11 +207,17 @@ impl Equations<'_> {
     }
 }
 
-/// What a contact point's force (N) and torque about its normal (N m) do to one of its sides.
+/// Whether a row may have a torque beside that of its force.
 #[inline]
-fn on_side(row: &Row, side: usize, force_W: &Vector3<f64>, torque_nm: f64) -> Vector6 {
+fn has_torque(row: &Row) -> bool {
+    row.torsion.most_nm > 0.0 || row.rolling.most_nm > 0.0
+}
+
+/// What a contact point's force (N) and torque (N m) do to one of its sides.
+#[inline]
+fn on_side(row: &Row, side: usize, force_W: &Vector3<f64>, torque_W: &Vector3<f64>) -> Vector6 {
     let sign = SIGNS[side];
-    joined(&(force_W * sign), &((row.arms_W[side].cross(force_W) + row.normal_W * torque_nm) * sign))
+    joined(&(force_W * sign), &((row.arms_W[side].cross(force_W) + torque_W) * sign))
 }
 
 /// `p W p`.

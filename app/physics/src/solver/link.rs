@@ -55,13 +55,25 @@ impl Link {
             .fold(self.given_W, |v, (side, place)| v + moving[place].at(&row.arms_W[side]) * SIGNS[side])
     }
 
-    /// How fast the body turns relative to the other, about the normal (rad/s).
+    /// How fast the body turns relative to the other (rad/s).
+    #[inline]
+    fn spin_W(&self, moving: &[Motion]) -> Vector3<f64> {
+        self.inside().fold(self.given_spin_W, |spin_W, (side, place)| {
+            spin_W + moving[place].angular_velocity_W * SIGNS[side]
+        })
+    }
+
+    /// The part of that about the normal (rad/s).
     #[inline]
     pub(super) fn spin_rad_s(&self, row: &Row, moving: &[Motion]) -> f64 {
-        let spin_W = self.inside().fold(self.given_spin_W, |spin_W, (side, place)| {
-            spin_W + moving[place].angular_velocity_W * SIGNS[side]
-        });
-        row.normal_W.dot(&spin_W)
+        row.normal_W.dot(&self.spin_W(moving))
+    }
+
+    /// The part of that across the normal (rad/s).
+    #[inline]
+    pub(super) fn rolls_W(&self, row: &Row, moving: &[Motion]) -> Vector3<f64> {
+        let spin_W = self.spin_W(moving);
+        spin_W - row.normal_W * row.normal_W.dot(&spin_W)
     }
 
     /// The most velocity that an impulse gives to the point, in whatever direction (1/kg).
@@ -92,6 +104,20 @@ impl Link {
             .sum()
     }
 
+    /// Gives an angular impulse to both sides (N m s).
+    #[inline]
+    pub(super) fn turn(&self, impulse_W: &Vector3<f64>, moving: &mut [Motion]) {
+        for (side, place) in self.inside() {
+            moving[place].turn(&(impulse_W * SIGNS[side]));
+        }
+    }
+
+    /// How fast the sides turn at most, all roundings counted (rad/s).
+    #[inline]
+    pub(super) fn most_spin_rad_s(&self, moving: &[Motion]) -> f64 {
+        self.inside().map(|(_, place)| moving[place].angular_velocity_W.norm()).sum()
+    }
+
     /// What spin about the normal an angular impulse about it gives (1/(kg m^2)).
     #[inline]
     pub(super) fn turn_about(&self, row: &Row, moving: &[Motion]) -> f64 {
@@ -107,18 +133,16 @@ impl Link {
         }
     }
 
-    /// Gives an angular impulse about the normal to both sides (N m s).
-    #[inline]
-    pub(super) fn twist(&self, row: &Row, impulse_nms: f64, moving: &mut [Motion]) {
-        for (side, place) in self.inside() {
-            moving[place].turn(&(row.normal_W * (impulse_nms * SIGNS[side])));
-        }
-    }
-
     /// Adds, for each two sides, by how much the first one's force and torque fall with the second one's velocity and spin:
-    /// the point's force by `falls` (N s/m), its torque about the normal by `twists` (N m s).
+    /// the point's force by `falls` (N s/m), its torque by `turns` (N m s), if there is any.
     #[inline]
-    pub(super) fn add_falls(&self, row: &Row, falls: &Matrix3<f64>, twists: f64, blocks: &mut Blocks) {
+    pub(super) fn add_falls(
+        &self,
+        row: &Row,
+        falls: &Matrix3<f64>,
+        turns: Option<&Matrix3<f64>>,
+        blocks: &mut Blocks,
+    ) {
         for (by_side, by_place) in self.inside() {
             // Of the force, by velocity and spin: `D` and `-D [s]`.
             let s = &row.arms_W[by_side];
@@ -138,10 +162,9 @@ impl Link {
                     add(&mut block[3 + at], &of_force[last], sign * r[next]);
                     add(&mut block[3 + at], &of_force[next], -sign * r[last]);
                 }
-                if twists != 0.0 {
-                    let n = &row.normal_W;
+                if let Some(turns) = turns {
                     for (at, by) in (0..9).map(|at| (at / 3, at % 3)) {
-                        block[3 + at][3 + by] += sign * twists * n[at] * n[by];
+                        block[3 + at][3 + by] += sign * turns[(at, by)];
                     }
                 }
             }

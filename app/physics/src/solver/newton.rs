@@ -12,8 +12,6 @@
 //! is), what such turns leave stands, and is said to be unsolved.
 //! Cost: at most [`MAX_SWEEPS`] rounds of all ways together, of large islands as many as [`MOST_PRODUCTS`] leave.
 
-use nalgebra::Vector3;
-
 use super::blocks::{self, Blocks};
 use super::equations::{Equations, Trial};
 use super::hold::Hold;
@@ -148,6 +146,7 @@ impl Search<'_> {
             let row = &mut rows[link.row];
             row.force_W = row.project(&row.force_W);
             row.torsion.begin();
+            row.rolling.begin();
         }
         self.equations.impulses(rows, self.now);
         let is_found = self.find(rows);
@@ -195,8 +194,7 @@ impl Search<'_> {
     fn make_do(&mut self, rows: &mut [Row]) {
         self.equations.let_slip(rows, &self.now.moving);
         for link in self.equations.links {
-            let row = &mut rows[link.row];
-            (row.force_W, row.torsion.torque_nm) = (Vector3::zeros(), 0.0);
+            rows[link.row].silence();
         }
         self.relax(rows, self.most_turns());
         self.equations.evaluate(rows, self.now, 1.0);

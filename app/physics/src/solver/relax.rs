@@ -23,7 +23,14 @@ pub(super) fn turns(equations: &Equations<'_>, rows: &mut [Row], moving: &mut [M
             let share = 1.0 / (1.0 + row.torsion.falls(dt_s) * link.turn_about(row, moving) * dt_s);
             let change_nm = (asked_nm - row.torsion.torque_nm) * share;
             row.torsion.torque_nm += change_nm;
-            link.twist(row, change_nm * dt_s, moving);
+            link.turn(&(row.normal_W * (change_nm * dt_s)), moving);
+        }
+        if row.rolling.most_nm > 0.0 {
+            let rolling = &row.rolling;
+            let missing_W = rolling.at_end_W(&link.rolls_W(row, moving), dt_s) - rolling.torque_W;
+            let share = 1.0 / (1.0 + rolling.falls(dt_s) * link.most_turn(moving) * dt_s);
+            row.rolling.torque_W += missing_W * share;
+            link.turn(&(missing_W * (share * dt_s)), moving);
         }
     }
 }

@@ -52,7 +52,7 @@ pub(super) fn solve(
     for &at in by_body.iter() {
         let row = &mut rows[at];
         row.force_W = row.project(&row.force_W);
-        row.torsion.torque_nm = 0.0;
+        (row.torsion.torque_nm, row.rolling.torque_W) = (0.0, Vector3::zeros());
         push(row, motions, &(row.force_W * dt_s));
     }
     let most_turns = (MAX_VISITS / by_body.len().max(1)).clamp(1, MAX_TURNS);
@@ -89,7 +89,7 @@ fn solve_body(
     for &at in which {
         let row = &mut rows[at];
         motions[body].push(&(row.force_W * -dt_s), &row.arms_W[0]);
-        motions[body].turn(&(row.normal_W * (-row.torsion.torque_nm * dt_s)));
+        motions[body].turn(&(row.torque_W() * -dt_s));
         if let Some(other) = row.other {
             // What all points give to the other together is at most so many times what one does.
             let sharing = were.iter().filter(|row| row.other == Some(other)).count();
@@ -101,11 +101,10 @@ fn solve_body(
     for (&at, was) in which.iter().zip(were.iter()) {
         let row = &mut rows[at];
         (row.rest_W, row.stiffness, row.damping) = (was.rest_W, was.stiffness, was.damping);
-        let (changed_W, turned_nm) =
-            (row.force_W - was.force_W, row.torsion.torque_nm - was.torsion.torque_nm);
+        let (changed_W, turned_W) = (row.force_W - was.force_W, row.torque_W() - was.torque_W());
         if let Some(other) = row.other {
             motions[other].push(&(changed_W * -dt_s), &row.arms_W[1]);
-            motions[other].turn(&(row.normal_W * (-turned_nm * dt_s)));
+            motions[other].turn(&(turned_W * -dt_s));
         }
         change = change.max(changed_W.norm_squared());
         most = most.max(row.force_W.norm_squared());

@@ -10,7 +10,7 @@ use haptics::Cuboid;
 use nalgebra::{Isometry3, Matrix3, UnitQuaternion, Vector3};
 use noise::Noise;
 use physics::{
-    Attachment, FingerSettings, HeldOrientation, Motion, Row, Settings, SoftFinger, Solver, Torsion,
+    Attachment, FingerSettings, HeldOrientation, Motion, Rolling, Row, Settings, SoftFinger, Solver, Torsion,
 };
 
 const EDGE: f64 = 0.05;
@@ -312,6 +312,7 @@ fn mixed(noise: &mut Noise) -> (Motion, Vec<Row>) {
                 0 => Row {
                     tie_n: Some(noise.log_within(1e-3, 100.0)),
                     torsion: Torsion::default(),
+                    rolling: Rolling::default(),
                     ..pressing
                 },
                 1 => turning,

@@ -5,7 +5,7 @@ use crate::noise;
 
 use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
 use noise::Noise;
-use physics::{Held, Islands, Motion, Row, Solver, Torsion};
+use physics::{Held, Islands, Motion, Rolling, Row, Solver, Torsion};
 
 const DT: f64 = 1e-3;
 const G: f64 = 9.81;
@@ -38,6 +38,7 @@ fn row(body: usize, other: Option<usize>) -> Row {
         held: Held::Stick,
         force_W: Vector3::zeros(),
         torsion: Torsion::default(),
+        rolling: Rolling::default(),
         tie_n: None,
     }
 }

@@ -62,3 +62,4 @@ mod spaces;
 mod stability;
 mod stack;
 mod torque_free;
+mod turning_friction;

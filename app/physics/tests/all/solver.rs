@@ -7,7 +7,7 @@ mod torsion;
 
 use nalgebra::{Matrix3, Vector3};
 use noise::Noise;
-use physics::{Held, MAX_SWEEPS, Motion, Row, Solver, Torsion};
+use physics::{Held, MAX_SWEEPS, Motion, Rolling, Row, Solver, Torsion};
 
 const DT: f64 = 1e-3;
 
@@ -45,6 +45,7 @@ fn row(noise: &mut Noise, size: f64, stiffness: f64, mu: f64) -> Row {
         held: if noise.chance(0.5) { Held::Stick } else { Held::Slip },
         force_W: normal_W * stiffness * noise.within(0.0, 1e-3),
         torsion: Torsion::default(),
+        rolling: Rolling::default(),
         tie_n: None,
     }
 }

@@ -1,0 +1,66 @@
+//! Torsional and rolling friction: what keeps a contact at a point from turning for ever.
+//!
+//! Problem: a ball touches in a point, which resists neither spinning nor rolling. Real contacts have an area.
+//! Model: torques about the normal and across it, each up to a length times the normal force (Coulomb's law, as along the
+//! surface). Within its limit each is that of a spring with the critical damper of what spins: the body is held at the rim of a patch of
+//! [`PATCH_M`] by springs as stiff as the contact's own. So what is held rests, and does not creep. On the limit the angle slides
+//! along. The normal force is that of the last tick.
+//! Where two entities touch at three points and more, friction and springs at these resist turning, and this is left to them.
+//! Frames: an angle, times [`PATCH_M`], is kept in the other's frame ([`Anchor`]).
+//! Invariant: what the springs hold is in the pair's account ([`super::ledger`]).
+//! Limit: of integrators that take forces of the beginning of a tick there is none.
+
+use nalgebra::{Isometry3, Vector3};
+
+use super::{Start, Surfacing};
+use crate::anchor::Anchor;
+use crate::row::{Rolling, Row, Torsion, within_ball};
+
+/// Points of two entities, of which each resists turning; more do so together.
+pub(super) const MOST_POINTS: usize = 2;
+/// Radius of the patch \[m\]: of a fingertip's size, below that of what is held.
+const PATCH_M: f64 = 3e-3;
+
+/// Gives a row its resistance to turning; `turned_W` is how far the body has been turned at the rim (m).
+pub(super) fn resist(row: &mut Row, surfacing: &Surfacing, turned_W: &Vector3<f64>, start: &Start<'_>) {
+    let normal_n = row.normal_W.dot(&row.force_W).max(0.0);
+    let [torsional_nm, rolling_nm] = surfacing.turning_m.map(|length_m| length_m * normal_n);
+    if torsional_nm.max(rolling_nm) == 0.0 || !start.is_implicit {
+        return;
+    }
+    // In the mean of all axes.
+    let turns = |body: usize| start.motions[body].inverse_inertia_W.trace() / 3.0;
+    let turns_per_kg_m2 = turns(row.body) + row.other.map_or(0.0, turns);
+    if turns_per_kg_m2 <= 0.0 {
+        return;
+    }
+    let stiffness_nm_per_rad = surfacing.stiffness_n_per_m * PATCH_M * PATCH_M;
+    let damping_nm_s_per_rad = 2.0 * (stiffness_nm_per_rad / turns_per_kg_m2).sqrt();
+    let rest_W = turned_W * (-stiffness_nm_per_rad / PATCH_M);
+    let rest_nm = row.normal_W.dot(&rest_W);
+    row.torsion = Torsion {
+        rest_nm,
+        stiffness_nm_per_rad,
+        damping_nm_s_per_rad,
+        most_nm: torsional_nm,
+        torque_nm: rest_nm,
+    };
+    let rest_W = rest_W - row.normal_W * rest_nm;
+    row.rolling =
+        Rolling { rest_W, stiffness_nm_per_rad, damping_nm_s_per_rad, most_nm: rolling_nm, torque_W: rest_W };
+}
+
+/// Remembers how the tick ended: `turns_W` is how far the body has turned in it relative to the other (rad).
+pub(super) fn settle(row: &Row, anchor: &mut Anchor, turns_W: &Vector3<f64>, X_WB: &Isometry3<f64>) {
+    let stiffness_nm_per_rad = row.rolling.stiffness_nm_per_rad;
+    if stiffness_nm_per_rad <= 0.0 {
+        return anchor.turn_back(0.0);
+    }
+    // No spring is turned by more than the limit turns it. What the damper adds to the torque is not the spring's.
+    let most_m = |most_nm: f64| most_nm * PATCH_M / stiffness_nm_per_rad;
+    let turned_W = anchor.turned_W(X_WB) + turns_W * PATCH_M;
+    let about_m = row.normal_W.dot(&turned_W);
+    let held_m = most_m(row.torsion.most_nm);
+    let across_W = within_ball(&(turned_W - row.normal_W * about_m), most_m(row.rolling.most_nm));
+    anchor.turn(&(across_W + row.normal_W * about_m.clamp(-held_m, held_m)), X_WB);
+}
