@@ -4,8 +4,8 @@
 //! nearer need not exist. Where it was known what friction may hold, they would be: that of a convex function, of which the
 //! least is the answer, and which every step of Newton's lessens if it is as long as it should be (Haslinger's iteration;
 //! Tresca's friction).
-//! Model: at first friction holds nothing. Then in turns that problem is solved, and friction holds what its points are
-//! pressed with there. Along a step the slope falls, and a step ends where it is next to none: no kink, however hard the
+//! Model: at first friction holds what is pressed where the search stands, or nothing. Then in turns that problem is solved, and
+//! friction holds what its points are pressed with there. Along a step the slope falls, and a step ends where it is next to none: no kink, however hard the
 //! point, leads astray.
 //! Cost: a derivative for each round and an evaluation for each try of its length, at most [`MOST_TRIES`].
 
@@ -22,24 +22,44 @@ pub(super) struct Hold<'a> {
     pub(super) blocks: &'a mut Blocks,
 }
 
+/// Place where holding begins.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) enum Begin {
+    /// The place where the search stands; it ends soon, near enough for Newton's steps.
+    Here,
+    /// No force at all; slower, and surer.
+    FromNothing,
+}
+
 impl Hold<'_> {
-    /// From no friction on: leads `now` to near the answer; says how many rounds that took, at most so many. `holds_n` has
-    /// room for what friction holds in each point.
+    /// Leads `now` to near the answer; says how many rounds that took, at most so many. `holds_n` has room for what friction
+    /// holds in each point.
     pub(super) fn run(
         &mut self,
         equations: &Equations<'_>,
         rows: &[Row],
+        begin: Begin,
         holds_n: &mut Vec<f64>,
         most_rounds: usize,
     ) -> usize {
-        self.now.p.fill(Vector6::zeros());
         holds_n.clear();
         holds_n.resize(equations.links.len(), 0.0);
+        let settled = match begin {
+            Begin::Here => {
+                equations.evaluate(rows, self.now, 1.0);
+                self.hold(equations, rows, holds_n);
+                NEARLY_SETTLED
+            }
+            Begin::FromNothing => {
+                self.now.p.fill(Vector6::zeros());
+                SETTLED
+            }
+        };
         let mut rounds = 0;
         for _ in 0..MOST_TURNS {
             let held = Equations { holds_n: Some(holds_n), ..*equations };
             rounds += self.least(&held, rows, most_rounds - rounds);
-            if self.hold(equations, rows, holds_n) < SETTLED || rounds >= most_rounds {
+            if self.hold(equations, rows, holds_n) < settled || rounds >= most_rounds {
                 break;
             }
         }
@@ -109,6 +129,7 @@ impl Hold<'_> {
 const FOUND: f64 = 1e-9;
 /// What friction holds has settled when it changes by less than this share.
 const SETTLED: f64 = 1e-6;
+const NEARLY_SETTLED: f64 = 1e-2;
 /// Turns of holding.
 const MOST_TURNS: usize = 32;
 /// Lengths of a step that are tried.

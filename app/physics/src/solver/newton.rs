@@ -14,7 +14,7 @@
 
 use super::blocks::{self, Blocks};
 use super::equations::{Equations, Trial};
-use super::hold::Hold;
+use super::hold::{Begin, Hold};
 use super::link::Link;
 use super::six::Vector6;
 use super::{MAX_SWEEPS, Motion, Solved, relax};
@@ -166,7 +166,9 @@ impl Search<'_> {
     fn find(&mut self, rows: &mut [Row]) -> bool {
         let mut turns = 0;
         loop {
-            let is_solved = self.approach(rows, 1.0) || self.hold(rows);
+            let is_solved = self.approach(rows, 1.0)
+                || self.hold(rows, Begin::Here)
+                || self.hold(rows, Begin::FromNothing);
             if is_solved && !self.equations.let_slip(rows, &self.now.moving) {
                 return true;
             }
@@ -183,10 +185,10 @@ impl Search<'_> {
     }
 
     /// The way over friction that holds what was pressed before; says whether it leads to the answer.
-    fn hold(&mut self, rows: &[Row]) -> bool {
+    fn hold(&mut self, rows: &[Row], begin: Begin) -> bool {
         let rounds = MOST_HELD.min(self.most_rounds.saturating_sub(self.rounds));
         let Self { equations, now, next, change, blocks, holds_n, .. } = self;
-        self.rounds += Hold { now, next, change, blocks }.run(equations, rows, holds_n, rounds);
+        self.rounds += Hold { now, next, change, blocks }.run(equations, rows, begin, holds_n, rounds);
         self.approach(rows, 1.0)
     }
 
