@@ -7,6 +7,7 @@
 //! Density: of one kind of the material, or the middle of a published range; it gives what moves a mass. How much of a bounce
 //! comes back is no property of a material: it depends on the partner, on the shape and above all on the speed, and falls from
 //! near 1 as soon as anything yields. So there is no number for it here.
+//! Torsional and rolling friction between entities: choices of ours, larger for what is softer.
 //! Stiffness and damping: all of them choices of ours. No desktop device tells aluminium from glass by stiffness: what is hard is
 //! as stiff as the device renders stably without damping at 1 kHz (`Limits::stiffness_n_per_m`), and what is
 //! softer comes below it, in an order that felt right, not in proportion to any modulus.
@@ -50,6 +51,8 @@ pub struct Material {
     pub density_kg_m3: f64,
     /// Where the density is from.
     pub density_source: &'static str,
+    /// Torque per normal force that its contacts with other entities resist, about the normal and across it (m).
+    pub turning_friction_m: f64,
 }
 
 impl Material {
@@ -113,7 +116,26 @@ impl Material {
         source: &'static str,
         (density_kg_m3, density_source): (f64, &'static str),
     ) -> Self {
-        Self { name, mu_s, mu_d, stiffness_n_per_m, damping_n_s_per_m, source, density_kg_m3, density_source }
+        Self {
+            name,
+            mu_s,
+            mu_d,
+            stiffness_n_per_m,
+            damping_n_s_per_m,
+            source,
+            density_kg_m3,
+            density_source,
+            // The softer it feels, the larger the patch: from a tenth of a millimetre to one.
+            turning_friction_m: if stiffness_n_per_m >= HARD.0 {
+                1e-4
+            } else if stiffness_n_per_m >= 600.0 {
+                2e-4
+            } else if stiffness_n_per_m >= 250.0 {
+                5e-4
+            } else {
+                1e-3
+            },
+        }
     }
 }
 

@@ -9,8 +9,8 @@
 //! swings, whatever it weighs. An entity may say another stiffness; two that do are one spring behind the other.
 //! Since forces are those of the end of the tick, no stiffness is too large for a light body. Of integrators that take
 //! those of its beginning this is not so: there contacts are as felt.
-//! Limit: the solver does not find the forces of dozens of bodies that also press each other sideways where contacts are stiff:
-//! 36 cubes in six stacks a tenth of a millimetre apart take all its rounds in every tick, and do not come to rest.
+//! Limit: of a pile of mixed shapes that is stirred the solver takes several times as many rounds where contacts are by mass, and
+//! does not find the forces of one tick in a hundred.
 
 use haptics::Entity;
 

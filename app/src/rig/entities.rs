@@ -31,6 +31,9 @@ impl Rig {
                 Some(stiffness_n_per_m) => entity.with_contact_stiffness(stiffness_n_per_m),
                 None => Ok(entity),
             })
+            .and_then(|entity| {
+                entity.with_turning_friction(spec.torsional_friction_m, spec.rolling_friction_m)
+            })
             .map(|entity| entity.with_algorithm(algorithm).with_shading(shading))
             .map_err(refused)?;
         let entity = if spec.faces.is_empty() {

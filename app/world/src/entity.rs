@@ -50,6 +50,11 @@ pub struct SceneEntity {
     pub restitution: Option<f64>,
     /// Of each point where another entity touches it \[N/m\], if it says.
     pub contact_stiffness_n_per_m: Option<f64>,
+    /// Torque about the normal that its contacts resist, per normal force \[m\]; default
+    /// [`SceneEntity::DEFAULT_TURNING_FRICTION_M`].
+    pub torsional_friction_m: f64,
+    /// The like across the normal.
+    pub rolling_friction_m: f64,
     /// Default the Friction Cone Algorithm.
     pub algorithm: AlgorithmSpec,
     /// What it is made of, if the scene says; it gave the values that the scene did not.
@@ -100,6 +105,8 @@ impl SceneEntity {
     /// Stiffness of an entity that gives none: firm to the touch, and well inside what a desktop
     /// device renders stably at 1 kHz with a tick of delay.
     pub const DEFAULT_STIFFNESS_N_PER_M: f64 = 1000.0;
+    /// Torsional and rolling friction of what does not say it (m).
+    pub const DEFAULT_TURNING_FRICTION_M: f64 = 2e-4;
 
     /// Reads the `[[entity]]` at position `i` of the list, laid over its template; a grid makes many of it.
     pub(crate) fn read_all<'d>(
@@ -155,6 +162,10 @@ impl SceneEntity {
         let contact_stiffness =
             table.get("contact_stiffness_n_per_m").map(|value| value.number(Bound::Positive)).transpose();
         let contact_stiffness_n_per_m = problems.keep(contact_stiffness);
+        let turning = made_of.map_or(Self::DEFAULT_TURNING_FRICTION_M, |made_of| made_of.turning_friction_m);
+        let length = |key: &str| table.number_or(key, Bound::NotNegative, turning);
+        let [torsional_friction_m, rolling_friction_m] =
+            ["torsional_friction_m", "rolling_friction_m"].map(|key| problems.keep(length(key)));
         let algorithm = problems.keep(AlgorithmSpec::read(table));
         let magnetism = problems.keep(MagnetismSpec::read(table));
         let vibration = problems.keep(VibrationSpec::read(table));
@@ -187,6 +198,8 @@ impl SceneEntity {
             faces: faces?,
             restitution: restitution?,
             contact_stiffness_n_per_m: contact_stiffness_n_per_m?,
+            torsional_friction_m: torsional_friction_m?,
+            rolling_friction_m: rolling_friction_m?,
             algorithm: algorithm?,
             material: made_of.map(|made_of| made_of.name),
             magnetism: magnetism?,
@@ -261,6 +274,8 @@ const KEYS: Vocabulary = Vocabulary {
         "rotation_locked",
         "restitution",
         "contact_stiffness_n_per_m",
+        "torsional_friction_m",
+        "rolling_friction_m",
         "haptic",
         "collidable",
         "visual",

@@ -232,6 +232,8 @@ macro_rules! with_surface {
                 "friction",
                 "restitution",
                 "contact_stiffness_n_per_m",
+                "torsional_friction_m",
+                "rolling_friction_m",
                 "algorithm",
                 "material",
                 "shading",

@@ -3,18 +3,22 @@
 
 use crate::common;
 
+use crate::noise::Noise;
+use crate::thrown::{KINDS, shape};
 use common::{G, body, object};
 use haptics::{Capsule, Cuboid, Cylinder, Entity, Plane, Shape, Sphere};
 use nalgebra::{Isometry3, UnitQuaternion, Vector3};
-use physics::{Body, ContactStiffness, Manipulation, Settings};
+use physics::{Body, ContactStiffness, Manipulation, Settings, Sleep, Standing};
 
 const R: f64 = 0.02;
 const MASS: f64 = 0.1;
+/// A ball swings on it at 2000 rad/s.
+const STIFFNESS: f64 = MASS * 2000.0 * 2000.0;
 
 /// Hard, so that a ball is as high above the ground as it is thick.
 fn settings() -> Settings {
     Settings {
-        contact_stiffness: ContactStiffness::ByMass { damping_ratio: 1.0 },
+        contact_stiffness: ContactStiffness::Given { stiffness_n_per_m: STIFFNESS, damping_ratio: 1.0 },
         sleep: None,
         ..Settings::default()
     }
@@ -62,7 +66,7 @@ impl Slope {
 
 /// A ball where it rests on the slope.
 fn ball(falls_rad: f64, motion: [Vector3<f64>; 2]) -> (Shape, Isometry3<f64>, [Vector3<f64>; 2]) {
-    let sunk_m = G * falls_rad.cos() / 2000.0_f64.powi(2);
+    let sunk_m = MASS * G * falls_rad.cos() / STIFFNESS;
     let at = Vector3::new(falls_rad.sin(), falls_rad.cos(), 0.0) * (R - sunk_m);
     (Sphere::new(R).unwrap().into(), Isometry3::from_parts(at.into(), UnitQuaternion::identity()), motion)
 }
@@ -181,4 +185,49 @@ fn a_box_does_not_know_of_it() {
         let mut without = Slope::new(0.0, vec![cube], &[[0.0; 2]], 1000.0);
         assert_eq!(slope.run(0.5), without.run(0.5));
     }
+}
+
+/// Things of all shapes are let fall into a box, in a heap: after five seconds all but one of the heaps are asleep, and in that one
+/// nothing moves so fast that anybody could see it.
+#[test]
+fn piles_of_mixed_shapes_come_to_rest_within_five_seconds() {
+    const WALL_M: f64 = 0.12;
+    let mut asleep = 0;
+    for count in [18, 24, 30, 36] {
+        let noise = &mut Noise::new(count as u64);
+        let with = |entity: Entity| entity.with_turning_friction(2e-4, 2e-4).unwrap();
+        let plane = |normal: Vector3<f64>, offset_m: f64| {
+            let plane = Plane::new(normal, offset_m).unwrap();
+            with(object(plane, Isometry3::identity(), 1000.0, 0.5))
+        };
+        let mut entities = vec![plane(Vector3::y(), 0.0)];
+        let walls = [Vector3::x(), -Vector3::x(), Vector3::z(), -Vector3::z()];
+        entities.extend(walls.map(|normal| plane(normal, -WALL_M)));
+        let mut bodies = Vec::new();
+        for place in 0..count {
+            let shape = shape(KINDS[noise.below(KINDS.len())], noise);
+            let [x, y, z] = [place % 3, place / 9, place / 3 % 3].map(|at| 0.06 * at as f64);
+            let at = Vector3::new(x - 0.06, y + 0.06, z - 0.06);
+            let X_WB = Isometry3::from_parts(at.into(), noise.turn());
+            let entity = with(object(shape, X_WB, 1000.0, 0.5));
+            bodies.push((entities.len(), body(&entity, noise.log_within(0.01, 0.2))));
+            entities.push(entity);
+        }
+        let contact_stiffness = ContactStiffness::ByMass { damping_ratio: 1.0 };
+        let settings = Settings { contact_stiffness, sleep: Some(Sleep::default()), ..Settings::default() };
+        let mut manipulation = Manipulation::new(&entities, &bodies, settings).unwrap();
+        let is_asleep = |manipulation: &Manipulation| {
+            (0..count).all(|body| manipulation.standing(body) == Standing::Asleep)
+        };
+        let mut ticks = 0;
+        while ticks < 5000 && !is_asleep(&manipulation) {
+            manipulation.step(&mut entities, &mut [], 1e-3);
+            ticks += 1;
+        }
+        asleep += usize::from(is_asleep(&manipulation));
+        let speeds = manipulation.bodies().iter().map(|body| body.velocity_W.norm());
+        let fastest = speeds.fold(0.0, f64::max);
+        assert!(fastest < 1e-4, "{count}: {fastest} m/s");
+    }
+    assert!(asleep >= 3, "{asleep} of 4");
 }

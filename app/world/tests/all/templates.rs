@@ -102,7 +102,7 @@ fn what_is_wrong_with_templates_and_grids_is_told_with_line_and_key() {
             "s.toml:4: template[0].mass: unknown key (did you mean `mass_kg`?); allowed: name, shape, position_m, \
              orientation_wxyz, stiffness_n_per_m, damping_n_s_per_m, friction, faces, algorithm, material, shading, height_map, \
              magnetism, vibration, movable, mass_kg, density_kg_m3, inertia_kg_m2, centre_of_mass_m, velocity_m_s, \
-             angular_velocity_rad_s, rotation_locked, restitution, contact_stiffness_n_per_m, haptic, collidable, visual, template, grid, within",
+             angular_velocity_rad_s, rotation_locked, restitution, contact_stiffness_n_per_m, torsional_friction_m, rolling_friction_m, haptic, collidable, visual, template, grid, within",
         ),
         (
             // Nobody uses it, but somebody wrote it.
