@@ -28,7 +28,7 @@ pub(super) enum Moved {
     Partly,
     /// To where another patch matters that is all but parallel to one that holds: tangent planes do not tell them apart.
     Grazing,
-    /// Nowhere: the target would stretch the spring.
+    /// Nowhere: the target would stretch the spring, or where patches meet on the way there cannot be told from here.
     TooFar,
 }
 
@@ -118,9 +118,12 @@ pub(super) fn advance(
     }
     let before = *god;
     if let Some(stop) = stop_where_it_ends(csg, god, &moved_B, hip_B) {
-        // Patches that hardly meet may meet elsewhere.
+        // Patches that hardly meet may meet elsewhere: from nearer by it is told where.
         if (god.point_B - hip_B).norm_squared() > longest || !is_where_it_was_going(csg, god) {
             *god = before;
+            if length_m > csg.tight_m() {
+                return Moved::TooFar;
+            }
         }
         return stop;
     }

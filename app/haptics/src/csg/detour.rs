@@ -7,8 +7,10 @@
 //! Model: all patches within [`Csg::tight_m`] of the god-object count as meeting there. Along each of them, and along the
 //! curve of each two, a step towards the HIP is made and brought back onto the patches. It is possible if it ends on the
 //! boundary, nearer to the HIP, and if a free path leads there: straight or over the tangent plane, a little above the
-//! boundary, so that ledges lower than this are stepped over. The step that ends nearest to the HIP is taken; longer ones
-//! are tried first. If none is possible, the god-object is a local minimum of the distance.
+//! boundary, so that ledges lower than this are stepped over. None leads from elsewhere into the tip of a gap between walls that
+//! are all but parallel: where two patches touch behind an edge, the gap that rounding leaves of it would hold the god-object.
+//! The step that ends nearest to the HIP is taken; longer ones are tried first. If none is possible, the god-object is a local
+//! minimum of the distance.
 //!
 //! Frames: object frame B. Invariants: no path leads through material, however thin; no step makes the spring longer.
 //! Cost: for each of [`SHARES`], the patches here and their pairs (36 at most), each a settlement and up to nine paths; on
@@ -85,6 +87,8 @@ struct Trial<'t> {
     hip_B: &'t Vector3<f64>,
     here: Sides,
     lift_m: f64,
+    /// Whether the god-object is in the tip of a gap already.
+    is_in_gap: bool,
     /// Above the god-object, in the open: away from the HIP, and away from what holds it; and where it is.
     starts: [Start; 3],
 }
@@ -113,7 +117,8 @@ impl<'t> Trial<'t> {
             if god.near.is_solid(sides) { as_it_is } else { Start { point_B, sides } }
         });
         let starts = [up, away, as_it_is];
-        Self { csg, god, hip_B, here: here(csg, god), lift_m, starts }
+        let is_in_gap = is_in_gap(csg, &god.near, &god.point_B, god.sides, hip_B);
+        Self { csg, god, hip_B, here: here(csg, god), lift_m, is_in_gap, starts }
     }
 
     fn near(&self) -> &Neighbourhood {
@@ -176,6 +181,9 @@ impl<'t> Trial<'t> {
     /// A god-object on these patches, if they are boundary there, and a way leads there.
     fn landed(&self, point_B: &Vector3<f64>, active: Sides) -> Option<God> {
         let sides = self.free_sides_at(point_B, active)?;
+        if !self.is_in_gap && is_in_gap(self.csg, self.near(), point_B, sides, self.hip_B) {
+            return None;
+        }
         let end_B = point_B + up(point_B, self.hip_B) * self.lift_m;
         if self.near().is_solid(self.near().sides(self.csg, &end_B)) || !self.is_open_way(&end_B) {
             return None;
@@ -187,10 +195,14 @@ impl<'t> Trial<'t> {
     fn free_sides_at(&self, point_B: &Vector3<f64>, active: Sides) -> Option<Sides> {
         let near = self.near();
         let levels_m = near.levels_m(self.csg, point_B);
-        let (mut sides, mut either) = (0, active);
+        let (mut sides, mut either) = (0, 0);
         for (index, level_m) in levels_m.iter().enumerate().take(near.count()) {
             sides |= usize::from(*level_m <= 0.0) << index;
             either |= usize::from(level_m.abs() <= self.csg.tolerance_m()) << index;
+        }
+        // Patches that pass each other by have no curve, however little is between them.
+        if active & !either != 0 {
+            return None;
         }
         let is_held = |sides: Sides| {
             !near.is_solid(sides) && places(active).all(|index| near.is_solid(sides ^ 1 << index))
@@ -231,6 +243,26 @@ impl<'t> Trial<'t> {
     }
 }
 
+/// Whether a place is in the tip of a gap: on two walls that face each other and are all but parallel.
+fn is_in_gap(
+    csg: &Csg,
+    near: &Neighbourhood,
+    point_B: &Vector3<f64>,
+    sides: Sides,
+    hip_B: &Vector3<f64>,
+) -> bool {
+    let levels_m = near.levels_m(csg, point_B);
+    let is_wall = |i: usize| levels_m[i].abs() <= csg.tolerance_m() && near.is_solid(sides ^ 1 << i);
+    let walls = (0..near.count()).filter(|&i| is_wall(i)).fold(0, |walls, i| walls | 1 << i);
+    let outward_B = |i: usize| {
+        let normal_B = near.patch(csg, i).look(point_B, hip_B).normal_B;
+        if sides >> i & 1 == 1 { -normal_B } else { normal_B }
+    };
+    !near.is_solid(sides)
+        && places(walls)
+            .any(|i| places(walls).take_while(|&k| k < i).any(|k| outward_B(i).dot(&outward_B(k)) < FACING))
+}
+
 /// Away from the HIP.
 fn up(point_B: &Vector3<f64>, hip_B: &Vector3<f64>) -> Vector3<f64> {
     let up_B = point_B - hip_B;
@@ -240,5 +272,7 @@ fn up(point_B: &Vector3<f64>, hip_B: &Vector3<f64>) -> Vector3<f64> {
 
 /// How far above the boundary ways lead, in terms of what counts as one place: over all that is in it.
 const LIFT: f64 = 2.0;
+/// Cosine between walls that face each other under less than a thousandth (rad).
+const FACING: f64 = -1.0 + 5e-7;
 /// Of the step that is asked for.
 const SHARES: [f64; 6] = [1.0, 0.125, 0.015_625, 2e-3, 2.5e-4, 3e-5];

@@ -7,7 +7,7 @@ use std::ops::AddAssign;
 use crate::common::*;
 use crate::joints::{Leaf, SIZE_M, contains, joined, leaves};
 use crate::trees::{built, random_tree, touchable};
-use haptics::{Capsule, Cone, CsgPart, CsgTree, Cuboid, Entity, Friction, Plane, Sphere};
+use haptics::{Capsule, Cone, CsgPart, CsgTree, Cuboid, Cylinder, Entity, Friction, Plane, Sphere, Torus};
 use nalgebra::Vector3;
 
 /// Ticks with a fault, by kind.
@@ -295,6 +295,20 @@ fn in_the_tip_of_a_conical_pit_a_finger_has_all_of_its_spring() {
     assert_eq!(faults.count(), 0, "{faults:?}");
 }
 
+/// A rod of this tree fills a ring that is taken away up to where it is highest, and its wall ends where both touch.
+#[test]
+fn before_a_gap_that_rounding_leaves_a_god_object_stays_on_its_edge() {
+    let (faults, _) = walk_over(61_466..61_467, joined);
+    assert_eq!(faults.count(), 0, "{faults:?}");
+}
+
+/// Two all but equal balls of this tree meet where nobody can tell from afar.
+#[test]
+fn where_balls_all_but_coincide_a_god_object_finds_their_edge_from_nearby() {
+    let (faults, _) = walk_over(72_931..72_932, joined);
+    assert_eq!(faults.count(), 0, "{faults:?}");
+}
+
 /// A way for a finger without friction over a tree made by hand: nothing may be wrong in any of its ticks.
 fn check_way(name: &str, tree: CsgTree, way: impl Fn(f64) -> Vector3<f64>) {
     let trial = Trial::new(tree);
@@ -322,6 +336,30 @@ fn where_leaves_that_coincide_are_cut_off_a_god_object_falls_onto_what_is_below(
             let rho = (1.0 - down * down).sqrt();
             end + Vector3::new(rho * around.cos(), down, rho * around.sin()) * (0.0128 - press_m)
         });
+    }
+}
+
+/// A ring bored out of a block is filled again within its circle, up to where it is highest, and a little less or more. The filling
+/// and the roof touch right behind the edge of both: along it the finger is drawn around, under the roof and back.
+#[test]
+fn where_a_filling_touches_the_roof_behind_its_edge_a_finger_follows_the_edge() {
+    let (circle_m, radius_m) = (0.0269, 0.0097);
+    let less = [0.0, 1e-16, 1e-15, 1e-14, 1e-13, 3e-13, 1e-11, 1e-10, 1e-9, 1e-8];
+    let more = [-1e-15, -1e-14, -1e-13, -1e-12, -1e-11, -3e-11, -1e-9];
+    for lower in less.into_iter().chain(more) {
+        let block = CsgPart::from(Cuboid::new([0.1, 0.05, 0.1]).unwrap());
+        let ring = CsgPart::from(Torus::new(circle_m, radius_m).unwrap());
+        let filling = Cylinder::new(circle_m, 2.0 * radius_m * (1.0 - lower)).unwrap();
+        let bored = CsgPart::from(CsgTree::difference([block, ring]));
+        let tree = CsgTree::union([bored, filling.into()]);
+        for (turn, press_m, reach_m) in [(2.0, 1e-3, 0.01), (1.0, 2e-4, 1e-3), (0.1, 1e-5, 1e-6)] {
+            check_way(&format!("lower by {lower}, {turn}"), tree.clone(), |t| {
+                let pressed = (10.0 * t).min(10.0 * (1.0 - t)).min(1.0);
+                let rho_m = circle_m + reach_m * (0.3 + (17.0 * t).cos()) * pressed + 1e-3 * (1.0 - pressed);
+                let height_m = radius_m - 1e-3 * (1.0 - pressed) + press_m * pressed;
+                Vector3::new(rho_m * (turn * t).cos(), height_m, rho_m * (turn * t).sin())
+            });
+        }
     }
 }
 
