@@ -96,6 +96,44 @@ fn a_cube_that_is_pushed_off_slides_as_far_as_its_friction_lets_it() {
     assert!(cube.last().unwrap().velocity.norm() < 1e-6, "{:?}", cube.last());
 }
 
+/// `dw/dt = -2.5 s g / r^2`: as the scene, the material and nobody says.
+#[test]
+fn a_ball_that_spins_on_a_table_is_braked_by_its_torsional_friction() {
+    let (radius, turns) = (0.02, 10.0);
+    for (key, length) in [
+        ("", 2e-4),
+        ("torsional_friction_m = 3e-4", 3e-4),
+        ("material = \"foam\"", 1e-3),
+        ("torsional_friction_m = 0.0", 0.0),
+    ] {
+        let table_key = if length < 2e-4 { key } else { "" };
+        let scene = format!(
+            r#"
+            [[finger]]
+            [[entity]]
+            shape = {{ kind = "plane", normal = [0.0, 1.0, 0.0], offset_m = 0.0 }}
+            {table_key}
+            [[entity]]
+            name = "ball"
+            shape = {{ kind = "sphere", radius_m = {radius} }}
+            position_m = [0.0, {radius}, 0.0]
+            angular_velocity_rad_s = [0.0, {turns:?}, 0.0]
+            mass_kg = 0.1
+            {key}"#
+        );
+        let played = played(&scene, &alone(1.0));
+        let (times, ball) = (played.numbers("t"), played.body("ball"));
+        let brakes = 2.5 * length * G / (radius * radius);
+        for (t, ball) in times.iter().zip(&ball) {
+            let expected = (turns - brakes * t).max(0.0);
+            // It bobs on its soft contact at first, pressed by now more, now less than its weight; so long a spring of the patch
+            // takes to wind up and to unwind.
+            let slack = brakes * 0.03 + 1e-9;
+            assert!((ball.angular_velocity.y - expected).abs() < slack, "{key} at {t}: {ball:?} {expected}");
+        }
+    }
+}
+
 #[test]
 fn below_the_friction_angle_a_cube_stays_and_above_it_slides_with_what_is_left() {
     let mu: f64 = 0.5;
