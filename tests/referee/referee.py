@@ -248,13 +248,32 @@ def lift(phantom3):
     return case
 
 
+def turn(phantom3):
+    radius, torsional, rolling = 0.02, 2e-4, 5e-4
+    case = Case(f"turn: a ball of {radius * 1e3:.0f} mm spins at 5 rad/s, and rolls at 0.1 m/s, until its friction stops it")
+    shape = f'{{ kind = "sphere", radius_m = {radius} }}'
+    lengths = f"torsional_friction_m = {torsional}\nrolling_friction_m = {rolling}\n"
+    sunk = MASS * G / (2000 / 3 * 10)
+    ball = f'<body pos="0 {radius} 0"><freejoint/><geom type="sphere" size="{radius}" mass="{MASS}" condim="6" friction="0.5 {torsional} {rolling}"/></body>'
+
+    def both(rest, v0, mu=0.5):
+        ours = ours_pose(run_ours(phantom3, scene(shape, MASS, (0, radius - sunk, 0), mu, hard=10.0, rest=lengths + rest), hand(1.5)))
+        return ours, run_theirs(ball, 1.5, mu, v0=v0)
+
+    (_, q), (_, Q) = both("angular_velocity_rad_s = [0.0, 5.0, 0.0]", [0, 0, 0, 0, 5, 0])
+    case.compare("turned until it stops", "deg", math.degrees(yaw(q)[-1]), math.degrees(yaw(Q)[-1]), 2.0, "58.4 by Coulomb's law; MuJoCo's is regularised")
+    (p, _), (P, _) = both("velocity_m_s = [0.1, 0.0, 0.0]\nangular_velocity_rad_s = [0.0, 0.0, -5.0]", [0.1, 0, 0, 0, 0, -5])
+    case.compare("rolled until it stops", "mm", p[-1, 0] * 1e3, P[-1, 0] * 1e3, 1.5, "28.5 by Coulomb's law")
+    return case
+
+
 def main():
     if len(sys.argv) != 2:
         sys.exit(f"usage: {sys.argv[0]} PHANTOM3; see the head of this file")
     phantom3 = str(Path(sys.argv[1]).resolve())
     print(f"MuJoCo {mujoco.__version__}, {phantom3}")
     agree = True
-    for experiment in (drop, slide, tip, push, lift):
+    for experiment in (drop, slide, tip, push, lift, turn):
         case = experiment(phantom3)
         print(f"\n{case.name}")
         for what, unit, ours, theirs, allowed, why in case.rows:

@@ -139,10 +139,10 @@ impl Entity {
     }
 
     /// With this resistance to turning in its contacts with other entities: torsional friction (about the normal) and rolling
-    /// friction (across it) are that many times the normal force (m). Errors: a length that is not finite or negative.
+    /// friction (across it) are that many times the normal force (m). Errors: a length that is not from 0 to 1.
     pub fn with_turning_friction(self, torsional_m: f64, rolling_m: f64) -> Result<Self, ParameterError> {
-        let torsional_friction_m = at_least_zero("torsional_friction_m", torsional_m)?;
-        let rolling_friction_m = at_least_zero("rolling_friction_m", rolling_m)?;
+        let torsional_friction_m = share("torsional_friction_m", torsional_m)?;
+        let rolling_friction_m = share("rolling_friction_m", rolling_m)?;
         Ok(Self { torsional_friction_m, rolling_friction_m, ..self })
     }
 

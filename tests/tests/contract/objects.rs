@@ -128,7 +128,7 @@ fn a_ball_that_spins_on_a_table_is_braked_by_its_torsional_friction() {
             let expected = (turns - brakes * t).max(0.0);
             // It bobs on its soft contact at first, pressed by now more, now less than its weight; so long a spring of the patch
             // takes to wind up and to unwind.
-            let slack = brakes * 0.03 + 1e-9;
+            let slack = brakes * 0.05 + 1e-9;
             assert!((ball.angular_velocity.y - expected).abs() < slack, "{key} at {t}: {ball:?} {expected}");
         }
     }

@@ -174,6 +174,18 @@ fn what_spins_on_another_turns_it_with_what_it_loses() {
     }
 }
 
+/// A torque that is no number would silence the contact.
+#[test]
+fn lengths_that_no_patch_has_are_refused() {
+    let ball = object(Sphere::new(R).unwrap(), Isometry3::identity(), 1000.0, 0.5);
+    for length_m in [-1e-9, 1.1, 1e308, f64::INFINITY, f64::NAN] {
+        for [torsional_m, rolling_m] in [[length_m, 0.0], [0.0, length_m]] {
+            let error = ball.clone().with_turning_friction(torsional_m, rolling_m).unwrap_err();
+            assert!(error.to_string().contains("a number from 0 to 1"), "{error}");
+        }
+    }
+}
+
 /// Of a box it is left to its corners: it neither turns over at another angle nor slides otherwise.
 #[test]
 fn a_box_does_not_know_of_it() {
