@@ -103,10 +103,11 @@ fn throw_all(scenes: u64, ticks: usize) {
         for is_deep in [false, true] {
             for kind in 0..KINDS.len() {
                 let kinds = &KINDS[kind..=kind];
-                let alone = Recipe { kinds, bodies: 1, is_deep, response: Response::Force };
+                let alone = Recipe { kinds, bodies: 1, is_deep, response: Response::Force, turning_m: 0.0 };
                 assert_never_grows(seed, &alone, ticks);
             }
-            let together = Recipe { kinds: &KINDS, bodies: 3, is_deep, response: Response::Force };
+            let together =
+                Recipe { kinds: &KINDS, bodies: 3, is_deep, response: Response::Force, turning_m: 0.0 };
             assert_never_grows(seed, &together, ticks);
         }
     }
@@ -115,6 +116,22 @@ fn throw_all(scenes: u64, ticks: usize) {
 #[test]
 fn energy_never_grows_where_springs_answer() {
     throw_all(15, 1500);
+}
+
+/// What springs of turning hold is in the account.
+#[test]
+fn energy_never_grows_where_contacts_resist_turning() {
+    for seed in 0..15 {
+        for turning_m in [1e-5, 1e-3, 0.03] {
+            for kind in 0..=KINDS.len() {
+                let all = kind == KINDS.len();
+                let (kinds, bodies) = if all { (&KINDS[..], 3) } else { (&KINDS[kind..=kind], 1) };
+                let recipe = |response| Recipe { kinds, bodies, is_deep: seed % 2 == 1, response, turning_m };
+                assert_never_grows(seed, &recipe(Response::Force), 1500);
+                assert_grows_by_no_impulse(seed, &recipe(Response::Bounce { restitution: 0.0 }), 1500);
+            }
+        }
+    }
 }
 
 #[test]
@@ -132,7 +149,11 @@ fn what_is_found_late_or_beside_a_debt_gains_nothing_either() {
     {
         let kinds = kind.map_or(&KINDS[..], |kind: usize| &KINDS[kind..=kind]);
         let bodies = if kind.is_some() { 1 } else { 3 };
-        assert_never_grows(seed, &Recipe { kinds, bodies, is_deep, response: Response::Force }, 4000);
+        assert_never_grows(
+            seed,
+            &Recipe { kinds, bodies, is_deep, response: Response::Force, turning_m: 0.0 },
+            4000,
+        );
     }
 }
 
@@ -176,6 +197,25 @@ fn what_was_placed_deep_comes_to_rest_on_all_of_its_depth() {
     assert!(off.abs() < 1e-9, "{off}");
 }
 
+/// The like where what meets is reflected.
+fn assert_grows_by_no_impulse(seed: u64, recipe: &Recipe, ticks: usize) {
+    let mut world = scene(seed, recipe);
+    world.step(&[]);
+    // What comes down in a tick to leave in the next has less in between.
+    let mut last_j = [of_bodies_j(&world) + world.manipulation.elastic_energy_j(); 3];
+    for tick in 0..ticks {
+        let slack = slack_j(&world);
+        world.step(&[]);
+        let now_j = of_bodies_j(&world) + world.manipulation.elastic_energy_j();
+        let was_j = last_j.into_iter().fold(f64::MIN, f64::max);
+        // What is stopped a million times harder than it moves stops a millionth of a way off.
+        let allowed_j = 1e-6 * was_j.abs();
+        let grown_j = now_j - was_j - slack.max(slack_j(&world)) - allowed_j;
+        assert!(grown_j <= 0.0, "{recipe:?} {seed}, tick {tick}: {last_j:?} J, then {now_j} J: {grown_j}");
+        last_j = [last_j[1], last_j[2], now_j];
+    }
+}
+
 /// Impulses reflect what meets; what they give where arms turn is owed.
 #[test]
 fn energy_never_grows_where_springs_let_go_what_meets() {
@@ -185,25 +225,8 @@ fn energy_never_grows_where_springs_let_go_what_meets() {
                 let all = kind == KINDS.len();
                 let (kinds, bodies) = if all { (&KINDS[..], 3) } else { (&KINDS[kind..=kind], 1) };
                 let response = Response::Bounce { restitution };
-                let recipe = Recipe { kinds, bodies, is_deep: seed % 2 == 1, response };
-                let mut world = scene(seed, &recipe);
-                world.step(&[]);
-                // What comes down in a tick to leave in the next has less in between.
-                let mut last_j = [of_bodies_j(&world) + world.manipulation.elastic_energy_j(); 3];
-                for tick in 0..1500 {
-                    let slack = slack_j(&world);
-                    world.step(&[]);
-                    let now_j = of_bodies_j(&world) + world.manipulation.elastic_energy_j();
-                    let was_j = last_j.into_iter().fold(f64::MIN, f64::max);
-                    // What is stopped a million times harder than it moves stops a millionth of a way off.
-                    let allowed_j = 1e-6 * was_j.abs();
-                    let grown_j = now_j - was_j - slack.max(slack_j(&world)) - allowed_j;
-                    assert!(
-                        grown_j <= 0.0,
-                        "{recipe:?} {seed}, tick {tick}: {last_j:?} J, then {now_j} J: {grown_j}"
-                    );
-                    last_j = [last_j[1], last_j[2], now_j];
-                }
+                let recipe = Recipe { kinds, bodies, is_deep: seed % 2 == 1, response, turning_m: 0.0 };
+                assert_grows_by_no_impulse(seed, &recipe, 1500);
             }
         }
     }

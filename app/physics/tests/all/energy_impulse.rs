@@ -64,7 +64,7 @@ fn allowed_for_j(row: &Row, world: &World, before: &[Body]) -> f64 {
 
 /// How much energy a scene gained beyond that, as a share of all that it lost.
 fn gained(seed: u64, response: Response, ticks: usize) -> f64 {
-    let recipe = Recipe { kinds: &KINDS[..2], bodies: 3, is_deep: false, response };
+    let recipe = Recipe { kinds: &KINDS[..2], bodies: 3, is_deep: false, response, turning_m: 0.0 };
     let mut world = scene(seed, &recipe);
     let [first_j, mut allowed_j] = step(&mut world);
     let (mut was_j, mut least_j, mut gained_j) = (first_j, first_j, 0.0);

@@ -54,6 +54,8 @@ pub struct Recipe {
     /// Half of the scenes begin with all of them within the floor, the wall and each other.
     pub is_deep: bool,
     pub response: Response,
+    /// Torsional and rolling friction of all (m).
+    pub turning_m: f64,
 }
 
 /// Some centimetres large.
@@ -89,6 +91,7 @@ pub fn scene(seed: u64, recipe: &Recipe) -> World {
     let plane = |noise: &mut Noise, normal: Vector3<f64>| {
         let plane = Plane::new(normal, 0.0).unwrap();
         let entity = Entity::new(plane, Isometry3::identity(), noise.log_within(100.0, 5000.0)).unwrap();
+        let entity = entity.with_turning_friction(recipe.turning_m, recipe.turning_m).unwrap();
         entity.with_friction(Friction::coulomb(mu(noise)).unwrap()).unwrap()
     };
     // A floor that may lean, and a wall across it.
@@ -108,6 +111,7 @@ pub fn scene(seed: u64, recipe: &Recipe) -> World {
         let entity = object(shape, X_WB, noise.log_within(10.0, 5000.0), mu(noise));
         let damping = if noise.chance(0.5) { 0.0 } else { noise.within(0.0, 2.0) };
         let entity = entity.with_damping(damping).unwrap();
+        let entity = entity.with_turning_friction(recipe.turning_m, recipe.turning_m).unwrap();
         bodies.push((entities.len(), thrown(&entity, noise)));
         entities.push(entity);
     }
