@@ -160,15 +160,13 @@ fn a_user_without_permission_is_told_mode_owner_group_and_own_id() {
         println!("skipped: the view of another user, which needs root");
         return;
     }
-    // Where the other user can run it.
-    let binary = directory.path().join("test");
-    copy_own_binary(&binary);
     let refusal = |directory_mode: u32| {
         std::fs::set_permissions(directory.path(), Permissions::from_mode(directory_mode)).unwrap();
         let shared = tempfile::Builder::new().permissions(Permissions::from_mode(0o755)).tempdir().unwrap();
-        let binary_outside = shared.path().join("test");
-        std::fs::copy(&binary, &binary_outside).unwrap();
-        let mut command = process(&binary_outside, "observer", &socket);
+        // Where the other user can run it.
+        let binary = shared.path().join("test");
+        copy_own_binary(&binary);
+        let mut command = process(&binary, "observer", &socket);
         let mut child = command.uid(NOBODY).gid(NOBODY).current_dir("/").spawn().unwrap();
         let line = line(&mut child, "refused: ");
         child.bounded_wait();

@@ -231,10 +231,11 @@ fn piles_of_mixed_shapes_come_to_rest_within_five_seconds() {
         let is_asleep = |manipulation: &Manipulation| {
             (0..count).all(|body| manipulation.standing(body) == Standing::Asleep)
         };
-        let mut ticks = 0;
-        while ticks < 5000 && !is_asleep(&manipulation) {
+        for _ in 0..5000 {
+            if is_asleep(&manipulation) {
+                break;
+            }
             manipulation.step(&mut entities, &mut [], 1e-3);
-            ticks += 1;
         }
         asleep += usize::from(is_asleep(&manipulation));
         let speeds = manipulation.bodies().iter().map(|body| body.velocity_W.norm());
