@@ -109,5 +109,5 @@ fn a_run_on_the_virtual_clock_that_a_fault_ends_tells_what_it_recorded() {
     assert!(said.err.contains("moved faster than it may"), "{}", said.err);
     let rows = Table::read(&place.path("out.csv")).len();
     assert!(said.out.contains(&format!("recording    out.csv ({rows} rows)")), "{rows}: {}", said.out);
-    assert!(said.out.contains("1 faults") && said.out.contains("peak force   "), "{}", said.out);
+    assert!(said.out.contains(" 1 fault") && said.out.contains("peak force   "), "{}", said.out);
 }
