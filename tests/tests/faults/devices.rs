@@ -234,7 +234,7 @@ fn an_app_whose_driver_faults_says_why_with_its_report_and_what_it_wrote_is_comp
         assert!(rows > 0);
         let told = [
             format!("recording    out.csv ({rows} rows)"),
-            "1 faults".into(),
+            " 1 fault".into(),
             "faults       1 of the driver".into(),
         ];
         assert!(told.iter().all(|words| end.out.contains(words)), "{end:?}");
