@@ -7,14 +7,14 @@
 //! is reserved then ([`Opened::start`]); that its beginning alone will fit is found out before the run
 //! ([`Opened::reserve`]). The piece is written over the content, in whose room and the reserved one it lies: also on a disk
 //! that others fill meanwhile. File systems that copy what is written over (btrfs) reserve no room for that, and may refuse the
-//! piece itself: so the rest of the content is cut off behind it and not before, and what was written over is put back if
-//! either is refused. Any other file begins at once.
+//! piece itself: there it is tried beside the file first. The rest of the content is cut off behind the piece and not before;
+//! what was written over is put back if anything is refused. Any other file begins at once.
 //! Invariant: what was opened and not started is as it was: a file that was made here is removed again.
 
 use super::destination::{is_standard_output, shown};
 use crate::recording::RecordingError;
 use rt_core::{limits, output_file};
-use rustix::fs::{FallocateFlags, fallocate};
+use rustix::fs::{FallocateFlags, Mode, OFlags, fallocate};
 use rustix::io::Errno;
 use rustix::termios::isatty;
 use std::fs::{File, Metadata, OpenOptions};
@@ -172,6 +172,8 @@ impl Opened {
     /// # Errors
     /// Refusal by the system: the file has its content as before, or if even that is refused, nothing.
     pub(super) fn replace_content(&mut self, piece: &[u8]) -> io::Result<()> {
+        let length = self.file.metadata()?.len();
+        self.try_beside(piece)?;
         let replaced = self.contents_first(piece.len());
         let written = (&self.file).write_all(piece).and_then(|()| self.cut(piece.len() as u64));
         if written.is_ok() {
@@ -179,18 +181,38 @@ impl Opened {
             return Ok(());
         }
         let back = (&self.file).stream_position().and_then(|reached| {
-            if reached > 0 {
-                (&self.file).rewind()?;
-                (&self.file).write_all(&replaced?)?;
-                (&self.file).rewind()?;
-            }
-            Ok(())
+            let replaced = replaced?;
+            // What nobody has written over is not written again: that might be refused where this is not.
+            let reached = replaced.len().min(usize::try_from(reached).unwrap_or(usize::MAX));
+            (&self.file).rewind()?;
+            (&self.file).write_all(&replaced[..reached])?;
+            (&self.file).rewind()?;
+            self.cut(length)
         });
         if back.is_err() {
             self.before = Before::Stays;
             self.cut(0)?;
         }
         written
+    }
+
+    /// Writes a piece into a file without a name beside this one, and gives it up again, on file systems that copy what is written
+    /// over: it takes the same room there as the piece over the content will, and costs nothing if there is none.
+    fn try_beside(&self, piece: &[u8]) -> io::Result<()> {
+        const BTRFS: i64 = 0x9123_683e;
+        const BCACHEFS: i64 = 0xca45_1a4e;
+        const ZFS: i64 = 0x2fc1_2fc1;
+        // A file system that does not say what it is is taken for a common one.
+        let kind = rustix::fs::fstatfs(&self.file).map_or(0, |found| i64::from(found.f_type));
+        if ![BTRFS, BCACHEFS, ZFS].contains(&kind) {
+            return Ok(());
+        }
+        let own = std::fs::read_link(format!("/proc/self/fd/{}", self.file.as_raw_fd()))?;
+        let Some(directory) = own.parent() else { return Ok(()) };
+        let nameless = rustix::fs::open(directory, OFlags::TMPFILE | OFlags::WRONLY, Mode::RUSR | Mode::WUSR);
+        // Where nobody may make a file the piece over the content tells.
+        let Ok(trial) = nameless else { return Ok(()) };
+        File::from(trial).write_all(piece)
     }
 
     /// So many bytes of the content, or all of it if that is less.
