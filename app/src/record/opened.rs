@@ -203,7 +203,7 @@ impl Opened {
         const BCACHEFS: i64 = 0xca45_1a4e;
         const ZFS: i64 = 0x2fc1_2fc1;
         // A file system that does not say what it is is taken for a common one.
-        let kind = rustix::fs::fstatfs(&self.file).map_or(0, |found| i64::from(found.f_type));
+        let kind = rustix::fs::fstatfs(&self.file).map_or(0, |found| found.f_type);
         if ![BTRFS, BCACHEFS, ZFS].contains(&kind) {
             return Ok(());
         }
