@@ -25,7 +25,7 @@ pub struct Anchor {
     stretch: Vector3<f64>,
     /// Force on the body in the last tick \[N\], in the other's frame.
     force: Vector3<f64>,
-    /// How far the body has been turned against its torsional and rolling friction, at the rim of their patch \[m\]; in the
+    /// Turn of the body against its torsional and rolling friction, at the rim of their patch \[m\]; in the
     /// other's frame, at the end of the tick.
     turned: Vector3<f64>,
     /// Whether it stuck or slid.
@@ -40,7 +40,7 @@ pub struct Anchor {
     pub(crate) pressed_m: f64,
     /// Which part of a spring it is.
     pub(crate) share: f64,
-    /// How far its springs were stretched when the last tick ended, along the normal, across it and in turning \[m^2\], squared:
+    /// Stretches of its springs when the last tick ended, along the normal, across it and in turning \[m^2\], squared:
     /// what the forces have worked against.
     pub(crate) worked: [f64; 3],
 }
@@ -119,12 +119,12 @@ impl Anchor {
         X_WB.rotation * self.force
     }
 
-    /// How far the body has been turned, in W \[m\].
+    /// Turn of the body, in W \[m\].
     pub(crate) fn turned_W(&self, X_WB: &Isometry3<f64>) -> Vector3<f64> {
         X_WB.rotation * self.turned
     }
 
-    /// How far it has been turned \[m^2\], squared.
+    /// Its square \[m^2\].
     pub(crate) fn turned_squared(&self) -> f64 {
         self.turned.norm_squared()
     }

@@ -35,7 +35,7 @@ pub struct Row {
     pub force_W: Vector3<f64>,
     /// What of its turning about the normal the contact resists.
     pub torsion: Torsion,
-    /// What of its rolling.
+    /// Its resistance to rolling.
     pub rolling: Rolling,
     /// A tie, not a contact: it pulls as well as it presses, in every direction up to this force \[N\]; there is no cone.
     pub tie_n: Option<f64>,

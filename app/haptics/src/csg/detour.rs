@@ -87,7 +87,7 @@ struct Trial<'t> {
     hip_B: &'t Vector3<f64>,
     here: Sides,
     lift_m: f64,
-    /// Whether the god-object is in the tip of a gap already.
+    /// True if the god-object is in the tip of a gap already.
     is_in_gap: bool,
     /// Above the god-object, in the open: away from the HIP, and away from what holds it; and where it is.
     starts: [Start; 3],
@@ -243,7 +243,7 @@ impl<'t> Trial<'t> {
     }
 }
 
-/// Whether a place is in the tip of a gap: on two walls that face each other and are all but parallel.
+/// True of a place in the tip of a gap: on two walls that face each other and are all but parallel.
 fn is_in_gap(
     csg: &Csg,
     near: &Neighbourhood,

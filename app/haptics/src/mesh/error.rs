@@ -40,7 +40,7 @@ pub enum MeshError {
     },
     /// Every face that has an area was a sliver upon another one.
     OnlySlivers {
-        /// How many faces there were.
+        /// Number of faces that there were.
         faces: usize,
     },
     /// Not as many triples of texture coordinates as faces.
