@@ -265,8 +265,8 @@ impl Pair {
         if self.surfacing.response.restitution().is_none() {
             return;
         }
-        let put_in_W = |row: &Row| (row.force_W - self.of_spring_W(row)).dot(&velocity(row, end.motions));
-        let mut left_j = self.rows(end.rows).iter().map(put_in_W).sum::<f64>().max(0.0) * end.dt_s;
+        let put_in_w = |row: &Row| (row.force_W - self.of_spring_W(row)).dot(&velocity(row, end.motions));
+        let mut left_j = self.rows(end.rows).iter().map(put_in_w).sum::<f64>().max(0.0) * end.dt_s;
         let (body, other) = self.bodies;
         for body in [Some(body), other].into_iter().flatten() {
             let part_j = left_j.min(spare_j[body].max(0.0));

@@ -5,10 +5,10 @@
 //! surface). Within its limit each is that of a spring with the critical damper of what spins: the body is held at the rim of a patch of
 //! [`PATCH_M`] by springs as stiff as the contact's own. So what is held rests, and does not creep. On the limit the angle slides
 //! along. The normal force is that of the last tick.
-//! Where two entities touch at three points and more, friction and springs at these resist turning, and this is left to them.
+//! Limits: three points and more of two entities resist turning by friction and springs, and this is left to them; and of
+//! integrators that take forces of the beginning of a tick there is none.
 //! Frames: an angle, times [`PATCH_M`], is kept in the other's frame ([`Anchor`]).
 //! Invariant: what the springs hold is in the pair's account ([`super::ledger`]).
-//! Limit: of integrators that take forces of the beginning of a tick there is none.
 
 use nalgebra::{Isometry3, Vector3};
 

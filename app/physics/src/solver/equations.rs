@@ -207,13 +207,13 @@ impl Equations<'_> {
     }
 }
 
-/// Whether a row may have a torque beside that of its force.
+/// True of a row that may have a torque beside that of its force.
 #[inline]
 fn has_torque(row: &Row) -> bool {
     row.torsion.most_nm > 0.0 || row.rolling.most_nm > 0.0
 }
 
-/// What a contact point's force (N) and torque (N m) do to one of its sides.
+/// Force and torque of a contact point (N, N m) as one of its sides gets them.
 #[inline]
 fn on_side(row: &Row, side: usize, force_W: &Vector3<f64>, torque_W: &Vector3<f64>) -> Vector6 {
     let sign = SIGNS[side];

@@ -55,7 +55,7 @@ impl Link {
             .fold(self.given_W, |v, (side, place)| v + moving[place].at(&row.arms_W[side]) * SIGNS[side])
     }
 
-    /// How fast the body turns relative to the other (rad/s).
+    /// Angular velocity of the body relative to the other (rad/s).
     #[inline]
     fn spin_W(&self, moving: &[Motion]) -> Vector3<f64> {
         self.inside().fold(self.given_spin_W, |spin_W, (side, place)| {
@@ -112,7 +112,7 @@ impl Link {
         }
     }
 
-    /// How fast the sides turn at most, all roundings counted (rad/s).
+    /// Sum of the sides' spins, which bounds their roundings (rad/s).
     #[inline]
     pub(super) fn most_spin_rad_s(&self, moving: &[Motion]) -> f64 {
         self.inside().map(|(_, place)| moving[place].angular_velocity_W.norm()).sum()

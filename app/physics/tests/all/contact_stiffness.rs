@@ -160,7 +160,7 @@ fn a_tower_of_forty_stands_and_sinks_by_a_sum() {
     }
 }
 
-/// What begins on the ground without having sunk in swings about its depth of rest as a damped spring does, whatever comes back
+/// A ball that begins on the ground without having sunk in swings about its depth of rest as a damped spring does, whatever comes back
 /// of an impact: this is none.
 #[test]
 fn what_settles_on_its_spring_goes_beyond_its_rest_by_what_damping_leaves() {

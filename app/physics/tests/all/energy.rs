@@ -118,7 +118,7 @@ fn energy_never_grows_where_springs_answer() {
     throw_all(15, 1500);
 }
 
-/// What springs of turning hold is in the account.
+/// Springs of turning have their energy in the account.
 #[test]
 fn energy_never_grows_where_contacts_resist_turning() {
     for seed in 0..15 {
