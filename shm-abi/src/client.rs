@@ -343,7 +343,8 @@ fn judge(socket: &Path, request: &Request, answer: &Answer) -> Result<(), Attach
             name: handshake::name_text(&answer.holder_name),
         }),
         Some(Verdict::Crowded) => {
-            Err(AttachError::Refused("it has too many connections; close some observers".into()))
+            let why = "it has too many connections; end programs that look on or left without reading its answer";
+            Err(AttachError::Refused(why.into()))
         }
         Some(Verdict::NoSegment) => {
             Err(AttachError::Refused("it could not create shared memory; see its log for the cause".into()))

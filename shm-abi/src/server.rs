@@ -28,6 +28,7 @@ use crate::segment::{CommanderView, DriverMemory, LeaseOffer, SegmentError};
 use crate::socket_file::{Lock, SocketFile, make_sure_nobody_listens, without_end};
 use crate::{socket, users};
 use connection::{Connection, Heard, Offer, Stage, timespec};
+use places::Purpose;
 use rustix::event::{PollFd, PollFlags, poll};
 use rustix::io::Errno;
 use rustix::net::SocketFlags;
@@ -40,10 +41,7 @@ use std::path::Path;
 use std::time::{Duration, Instant};
 
 pub use crate::socket_file::BindError;
-pub use places::{
-    FOR_ADMINISTRATORS, FOR_COMMANDERS, MAX_ASKING, MAX_CONNECTIONS, MAX_OBSERVERS, MAX_OBSERVERS_OF_PROCESS,
-    MAX_OBSERVERS_OF_USER,
-};
+pub use places::{COMMANDERS, MAX_ASKING, MAX_CONNECTIONS, OBSERVERS, Places};
 
 /// How long a new connection may take to say what it wants.
 pub const PATIENCE: Duration = Duration::from_secs(1);
@@ -407,12 +405,14 @@ impl Server {
         self.rights.check(right, connection.peer.user(), || connection.groups())
     }
 
-    fn let_observe(&self, index: usize, memory: &DriverMemory) -> Stage {
-        let observes = |connection: &Connection| matches!(connection.stage, Stage::Observing);
-        let others = self.connections.iter().filter(|other| observes(other) || other.left_descriptors());
+    fn has_place(&self, index: usize, purpose: Purpose) -> bool {
+        let others = self.connections.iter().filter(|other| other.has_place(purpose)).map(Connection::owner);
         let is_administrator = self.check(index, Right::Administer).is_ok();
-        let newcomer = self.connections[index].owner();
-        if !places::may_observe(newcomer, is_administrator, others.map(Connection::owner)) {
+        places::has_place(purpose, self.connections[index].owner(), is_administrator, others)
+    }
+
+    fn let_observe(&self, index: usize, memory: &DriverMemory) -> Stage {
+        if !self.has_place(index, Purpose::Observe) {
             return self.refuse(index, Verdict::Crowded);
         }
         match self.answer(index, &Answer::new(Verdict::Granted), &[memory.fd()]) {
@@ -433,8 +433,7 @@ impl Server {
             let _ = to.take(ServerEvent::LeaseRefused);
             return self.refuse(index, Verdict::LeaseHeld);
         }
-        let left = self.connections.iter().filter(|other| other.left_descriptors());
-        if !places::may_command(self.connections[index].owner(), left.map(Connection::owner)) {
+        if !self.has_place(index, Purpose::Command) {
             return self.refuse(index, Verdict::Crowded);
         }
         let connection = &self.connections[index];

@@ -1,6 +1,6 @@
 //! One client of the server, and how far it has come.
 
-use super::places::Owner;
+use super::places::{Owner, Purpose};
 use crate::handshake::Request;
 use crate::peer::{Peer, Process, has_unread};
 use crate::segment::{LeaseOffer, TAKEN_WITHIN};
@@ -17,8 +17,8 @@ pub(super) struct Connection {
     pub(super) stream: UnixStream,
     pub(super) peer: Peer,
     pub(super) stage: Stage,
-    /// It was sent some.
-    has_descriptors: bool,
+    /// Purpose for which it was sent descriptors, if it was.
+    purpose: Option<Purpose>,
 }
 
 #[derive(Debug)]
@@ -81,12 +81,16 @@ pub(super) enum Heard {
 impl Connection {
     pub(super) fn new(stream: UnixStream, peer: Peer) -> Self {
         let stage = Stage::Asking { bytes: [0; size_of::<Request>()], filled: 0, since: Instant::now() };
-        Self { stream, peer, stage, has_descriptors: false }
+        Self { stream, peer, stage, purpose: None }
     }
 
     /// Goes on to where its request has led it.
     pub(super) fn served(&mut self, stage: Stage) {
-        self.has_descriptors |= matches!(stage, Stage::Observing | Stage::Commanding { .. });
+        match stage {
+            Stage::Observing => self.purpose = Some(Purpose::Observe),
+            Stage::Commanding { .. } => self.purpose = Some(Purpose::Command),
+            Stage::Asking { .. } | Stage::Gone => {}
+        }
         self.stage = stage;
     }
 
@@ -97,11 +101,16 @@ impl Connection {
     /// True of one that is gone while descriptors that it was sent lie there unread: they count against the driver, so that it
     /// keeps its place.
     pub(super) fn left_descriptors(&self) -> bool {
-        self.is_gone() && self.has_descriptors && has_unread(self.stream.as_fd())
+        self.is_gone() && self.purpose.is_some() && has_unread(self.stream.as_fd())
+    }
+
+    /// True of one that has a place of this purpose: it looks on, or has left.
+    pub(super) fn has_place(&self, purpose: Purpose) -> bool {
+        self.purpose == Some(purpose) && (matches!(self.stage, Stage::Observing) || self.left_descriptors())
     }
 
     pub(super) fn owner(&self) -> Owner {
-        Owner { uid: self.peer.uid, pid: self.peer.pid }
+        Owner { user: self.peer.user(), pid: self.peer.pid }
     }
 
     pub(super) fn is_asking(&self) -> bool {

@@ -9,7 +9,7 @@ use patience::limit;
 use patience::prelude::*;
 use shm_abi::client::{self, AttachError};
 use shm_abi::handshake::{Answer, Request, RequestKind, Verdict};
-use shm_abi::server::{BATCH, MAX_ASKING, MAX_OBSERVERS_OF_PROCESS, PATIENCE};
+use shm_abi::server::{BATCH, COMMANDERS, MAX_ASKING, OBSERVERS, PATIENCE};
 use std::io::{Read, Write};
 use std::net::Shutdown;
 use std::os::fd::AsFd;
@@ -21,9 +21,9 @@ fn observers_in_any_number_leave_room_for_a_commander_and_a_stop() {
     let directory = directory();
     let host = Host::start(directory.path());
     let observers: Vec<_> =
-        (0..MAX_OBSERVERS_OF_PROCESS).map(|_| client::observe(&host.socket, "looker").unwrap()).collect();
+        (0..OBSERVERS.of_process).map(|_| client::observe(&host.socket, "looker").unwrap()).collect();
     let refusal = client::observe(&host.socket, "one too many").unwrap_err();
-    let crowded = "the driver refused: it has too many connections; close some observers";
+    let crowded = "the driver refused: it has too many connections; end programs that look on or left without reading its answer";
     assert_eq!(refusal.to_string(), crowded);
     let commander = client::command(&host.socket, "hand").unwrap();
     client::stop(&host.socket, "test").unwrap();
@@ -36,7 +36,7 @@ fn observers_in_any_number_leave_room_for_a_commander_and_a_stop() {
 #[test]
 fn who_leaves_without_taking_what_was_handed_over_keeps_the_place() {
     let mut desk = Desk::open();
-    let mut leave_behind = |kind| {
+    let leave_behind = |desk: &mut Desk, kind| {
         let mut stream = desk.connect();
         stream.write_all(bytemuck::bytes_of(&Request::new(kind, "hoarder"))).unwrap();
         desk.poll(SHORT);
@@ -44,17 +44,23 @@ fn who_leaves_without_taking_what_was_handed_over_keeps_the_place() {
         desk.poll(SHORT);
         stream
     };
-    let asks = MAX_OBSERVERS_OF_PROCESS + 6;
-    let observers: Vec<_> = (0..asks).map(|_| leave_behind(RequestKind::Observe)).collect();
-    let commanders: Vec<_> = (0..4).map(|_| leave_behind(RequestKind::Command)).collect();
     let granted = |streams: &[UnixStream]| {
         streams.iter().filter(|stream| verdict_after_shutdown(stream) == Some(Verdict::Granted)).count()
     };
-    assert_eq!(granted(&observers), MAX_OBSERVERS_OF_PROCESS);
-    assert_eq!(granted(&commanders), 0, "the process has too many places already");
-    // What was read holds nothing any more.
-    desk.poll(SHORT);
-    desk.poll(SHORT);
+    // Neither takes the other's places, whichever asks first.
+    for order in [[RequestKind::Observe, RequestKind::Command], [RequestKind::Command, RequestKind::Observe]] {
+        let left = order.map(|kind| {
+            let places = if kind == RequestKind::Observe { OBSERVERS } else { COMMANDERS }.of_process;
+            let streams: Vec<_> = (0..places + 6).map(|_| leave_behind(&mut desk, kind)).collect();
+            (streams, kind, places)
+        });
+        for (streams, kind, places) in &left {
+            assert_eq!(granted(streams), *places, "{kind:?} in {order:?}");
+        }
+        // What was read holds nothing any more.
+        desk.poll(SHORT);
+        desk.poll(SHORT);
+    }
     desk.granted(RequestKind::Observe);
 }
 

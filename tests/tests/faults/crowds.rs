@@ -1,7 +1,7 @@
 //! Crowds: many look on, many say nothing, many connect again and again. Whoever commands goes on, and the motors can be
 //! stopped.
 
-use shm_abi::server::{MAX_ASKING, MAX_OBSERVERS_OF_PROCESS, MAX_OBSERVERS_OF_USER};
+use shm_abi::server::{MAX_ASKING, OBSERVERS};
 use shm_abi::{DriverState, client, stop_socket};
 use std::os::unix::net::UnixStream;
 use std::path::Path;
@@ -23,7 +23,7 @@ fn a_crowd_of_clients_disturbs_nobody_and_leaves_room_for_stopping() {
     let observers: Vec<_> =
         std::iter::from_fn(|| client::observe(&stand.socket(), "crowd").ok()).take(100).collect();
     // The stand itself is one of this process.
-    assert_eq!(observers.len() + 1, MAX_OBSERVERS_OF_PROCESS);
+    assert_eq!(observers.len() + 1, OBSERVERS.of_process);
     let refused = client::observe(&stand.socket(), "crowd").expect_err("no more");
     assert!(refused.to_string().contains("the driver refused"), "{refused}");
     let mut log = RingLog::begin(stand.view());
@@ -58,7 +58,7 @@ fn with_every_place_taken_the_motors_are_stopped_all_the_same() {
     let name = stand.socket().to_str().expect("plain").to_owned();
     // The stand's own observer has a place as well.
     let crowd =
-        [MAX_OBSERVERS_OF_PROCESS, MAX_OBSERVERS_OF_USER - MAX_OBSERVERS_OF_PROCESS - 1].map(|count| {
+        [OBSERVERS.of_process, OBSERVERS.of_user - OBSERVERS.of_process - 1].map(|count| {
             let mut looker = Running::start(&mut myself(EVERY_PLACE, &name));
             looker.hear(&format!("{count} places"));
             looker
