@@ -10,7 +10,10 @@ use crate::snapshots::Drawn;
 use io_driver::status::CounterStatus;
 use rt_core::plain_text::Plain;
 use rt_core::setup::SetupReport;
+use rustix::fs::{FileType, fstat};
 use std::fmt;
+use std::io;
+use std::path::Path;
 
 /// The end of a run in figures.
 pub struct Report {
@@ -56,7 +59,7 @@ impl Report {
         let lacks_pictures = self.pictures.as_ref().is_some_and(|drawn| drawn.failure.is_some());
         let has_waited = self.timing.is_none();
         let is_whole = |recorded: &Recorded| {
-            recorded.failure.is_none() && !(has_waited && recorded.lost + self.tally.rows_lost > 0)
+            recorded.failure.is_none() && !(has_waited && recorded.missing(self.tally.rows_lost) > 0)
         };
         lacks_pictures || !self.recordings.iter().all(is_whole)
     }
@@ -127,7 +130,9 @@ impl fmt::Display for Report {
         for line in &self.parked {
             writeln!(f, "parked       {line}")?;
         }
-        writeln!(f, "events       {}", self.events)?;
+        let is_before = counters.faults > 0 && tally.rows == 0;
+        let before = if is_before { "; the fault came before t = 0" } else { "" };
+        writeln!(f, "events       {}{before}", self.events)?;
         if let Some(orders) = &self.orders {
             writeln!(f, "orders       {orders}")?;
         }
@@ -161,11 +166,19 @@ impl fmt::Display for Report {
     }
 }
 
+/// True of a pipe, a terminal or a socket, named or the standard output.
+fn has_reader(path: &Path) -> bool {
+    if is_standard_output(path) {
+        return fstat(io::stdout()).is_ok_and(|found| !FileType::from_raw_mode(found.st_mode).is_file());
+    }
+    path.metadata().is_ok_and(|found| !found.is_file())
+}
+
 /// What became of a recording, of a run that could not hand on so many rows.
 pub(crate) fn recording_line(recorded: &Recorded, rows_lost: u64) -> String {
-    let Recorded { path, rows, unit, lost, is_left_behind, failure, is_as_before } = recorded;
-    let who = if is_standard_output(path) { "its reader" } else { "the disk" };
-    let lost = match lost + rows_lost {
+    let Recorded { path, rows, unit, is_left_behind, failure, is_as_before, .. } = recorded;
+    let who = if has_reader(path) { "its reader" } else { "the disk" };
+    let lost = match recorded.missing(rows_lost) {
         0 => String::new(),
         lost if *is_left_behind => format!(" at least, {lost} LOST at most: {who} was too slow"),
         lost => format!(", {lost} LOST: {who} was too slow"),

@@ -17,6 +17,7 @@ use rt_core::privileges::{Keep, reduce_thread};
 use rt_core::setup::{Guarantee, promote_beside};
 use rt_core::signals;
 use shm_abi::stop_socket::{Drain, StopSocket};
+use shm_abi::users::UserWords;
 use std::io;
 use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
 use std::time::Duration;
@@ -121,7 +122,7 @@ impl Stops {
                     queue.take();
                 }
                 if is_new && !is_quiet {
-                    let user = user.map_or("an unknown user".into(), |user| format!("user {user}"));
+                    let user = UserWords(user);
                     say(format_args!("io-driver: emergency stop, asked for by {user} by datagram"));
                 }
                 switch_off_if_unheard(&urgent);

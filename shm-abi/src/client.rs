@@ -368,14 +368,24 @@ fn judge(socket: &Path, request: &Request, answer: &Answer) -> Result<(), Attach
 }
 
 fn not_allowed(socket: &Path, request: &Request, answer: &Answer) -> AttachError {
+    let user = rustix::process::geteuid().as_raw();
     AttachError::NotAllowed {
         socket: socket.into(),
         wish: RequestKind::from_word(request.kind).map_or("do this", RequestKind::wish),
-        user: rustix::process::geteuid().as_raw(),
-        allowed: match answer.allowed_group() {
-            Some(group) => format!("members of group {}", group_in_words(group)),
-            None => "root and the user that the driver runs as".into(),
-        },
+        user,
+        allowed: allowed_in_words(answer.allowed_group(), user),
+    }
+}
+
+/// Who has a right that this user, who asked, has not.
+fn allowed_in_words(group: Option<u32>, user: u32) -> String {
+    const OWNERS: &str = "root and the user that the driver runs as";
+    match group {
+        Some(group) => format!("members of group {}", group_in_words(group)),
+        None if user == 0 => {
+            format!("{OWNERS}, in the driver's own user namespace (`nsenter --user --target PID` enters it),")
+        }
+        None => OWNERS.into(),
     }
 }
 

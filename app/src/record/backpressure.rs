@@ -131,9 +131,11 @@ impl Wait {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::book::Book;
     use crate::columns::Names;
-    use crate::record::{RecordFile, Recorded, Recorder};
+    use crate::record::{EventsFile, Opened, RecordFile, Recorded, Recorder};
     use crate::recording::Recording;
+    use crate::report::recording_line;
     use crate::row::Row;
     use patience::prelude::*;
     use rustix::fs::OFlags;
@@ -141,19 +143,27 @@ mod tests {
     use std::io::{self, Read};
     use std::os::unix::fs::OpenOptionsExt;
     use std::path::Path;
+    use world::events::{Event, Kind, Subscriber};
 
     const PERIOD_NS: u64 = 1_000_000;
 
     /// A recorder into a pipe, and the pipe's other end.
     fn piped(pipe: &Path, patience: Duration) -> (Recorder, File) {
+        piped_as(pipe, patience, |file| {
+            let table = Recording::begin(file, Names::default(), PERIOD_NS);
+            RecordFile::Csv(Box::new(table.expect("a table")))
+        })
+    }
+
+    fn piped_as(pipe: &Path, patience: Duration, begin: impl FnOnce(Opened) -> RecordFile) -> (Recorder, File) {
         let (kind, mode) = (rustix::fs::FileType::Fifo, rustix::fs::Mode::RUSR | rustix::fs::Mode::WUSR);
         rustix::fs::mknodat(rustix::fs::CWD, pipe, kind, mode, 0).expect("a pipe");
         let without_waiting = OFlags::NONBLOCK.bits().cast_signed();
         let reader =
             OpenOptions::new().read(true).custom_flags(without_waiting).open(pipe).expect("a reader");
-        let file = Recording::create(pipe, Names::default(), PERIOD_NS).expect("a table");
+        let file = begin(Opened::recording(pipe).expect("a pipe that is read"));
         let how = Backpressure { patience, ..Backpressure::new(WhenFull::Wait, &StopSignals::default()) };
-        let recorder = Recorder::start(pipe, RecordFile::Csv(Box::new(file)), 0, PERIOD_NS, how);
+        let recorder = Recorder::start(pipe, file, 0, PERIOD_NS, how);
         (recorder.expect("a thread"), reader)
     }
 
@@ -192,6 +202,34 @@ mod tests {
         let lines = piece[..count].iter().filter(|byte| **byte == b'\n').count() as u64;
         // One is the header.
         assert!(lines > 1000 && rows < lines, "{rows} of {lines}");
+    }
+
+    #[test]
+    fn of_events_that_nobody_reads_events_are_counted_and_no_ticks() {
+        let directory = tempfile::tempdir().expect("a directory");
+        let pipe = directory.path().join("pipe.jsonl");
+        let (mut recorder, _reader) = piped_as(&pipe, Duration::from_millis(300), |file| {
+            let events = EventsFile::create(file, Names::default(), PERIOD_NS, Book::default());
+            RecordFile::Events(Box::new(events.expect("a pipe")))
+        });
+        let mut feed = recorder.take_events().expect("nobody has taken it");
+        // An event has thirty bytes at least, a pipe 64 KiB, the queue 8192 events, the file's own buffer 256 KiB.
+        let most = 50_000;
+        let mut sent = 0;
+        while !feed.is_over() && sent < most {
+            feed.event(&Event { run_tick: sent, kind: Kind::Reset });
+            // Of a hundred ticks each.
+            if sent % 100 == 0 {
+                recorder.send(&Row { run_tick: sent, ..Row::empty() }, &[]);
+            }
+            sent += 1;
+        }
+        assert!(sent < most, "nobody reads");
+        let recorded = recorder.finish();
+        assert_eq!((recorded.unit, recorded.rows + recorded.lost), ("events", sent));
+        let line = recording_line(&recorded, 12);
+        let told = format!("({} events at least, {} LOST at most: its reader was too slow)", recorded.rows, recorded.lost);
+        assert!(line.contains(&told), "{line}");
     }
 
     #[test]

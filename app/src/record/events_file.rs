@@ -46,6 +46,11 @@ impl EventsFile {
         self.lines.is_as_before()
     }
 
+    /// Events in the file.
+    pub fn rows(&self) -> u64 {
+        self.lines.rows()
+    }
+
     /// Appends an event.
     ///
     /// # Errors

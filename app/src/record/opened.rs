@@ -8,7 +8,8 @@
 //! ([`Opened::reserve`]). The piece is written over the content, in whose room and the reserved one it lies: also on a disk
 //! that others fill meanwhile. File systems that copy what is written over (btrfs) reserve no room for that, and may refuse the
 //! piece itself: there it is tried beside the file first. The rest of the content is cut off behind the piece and not before;
-//! what was written over is put back if anything is refused. Any other file begins at once.
+//! what was written over is put back if anything is refused. Until then the first byte is [`HALF_REPLACED`], so that nobody
+//! takes what a killed process leaves for one recording. Any other file begins at once.
 //! Invariant: what was opened and not started is as it was: a file that was made here is removed again.
 
 use super::destination::{is_standard_output, shown};
@@ -17,11 +18,16 @@ use rt_core::{limits, output_file};
 use rustix::fs::{FallocateFlags, Mode, OFlags, fallocate};
 use rustix::io::Errno;
 use rustix::termios::isatty;
+use std::cell::Cell;
 use std::fs::{File, Metadata, OpenOptions};
 use std::io::{self, Read, Seek, Write};
 use std::os::fd::{AsFd, AsRawFd};
-use std::os::unix::fs::{FileTypeExt, MetadataExt};
+use std::os::unix::fs::{FileExt, FileTypeExt, MetadataExt};
 use std::path::{Path, PathBuf};
+use std::time::SystemTime;
+
+/// First byte of a file with a part of its earlier content behind a first piece: that of no recording.
+pub(super) const HALF_REPLACED: u8 = 0;
 
 /// So often a file that is being opened may be removed by others who made it for nothing.
 const MOST_REMOVED: u32 = 100;
@@ -32,6 +38,8 @@ pub struct Opened {
     file: File,
     path: PathBuf,
     before: Before,
+    /// Last change of the content before room was reserved behind it, if some was.
+    changed: Cell<Option<SystemTime>>,
 }
 
 /// Former state of a file, which it has again with this value.
@@ -60,7 +68,8 @@ impl Drop for Opened {
         let _ = match &self.before {
             Before::Absent(path) => std::fs::remove_file(path),
             Before::Empty => self.file.set_len(0),
-            Before::Content | Before::Stays => Ok(()),
+            Before::Content => self.changed.take().map_or(Ok(()), |changed| self.give_room_back(changed)),
+            Before::Stays => Ok(()),
         };
     }
 }
@@ -76,7 +85,7 @@ impl Opened {
                 return Err(io::Error::other("it was closed when this program started"));
             }
             let file = io::stdout().as_fd().try_clone_to_owned().map(File::from)?;
-            return Ok(Self { file, path: path.into(), before: Before::Stays });
+            return Ok(Self::with(file, path, Before::Stays));
         }
         for _ in 0..MOST_REMOVED {
             let (file, made) = open_or_make(path)?;
@@ -84,7 +93,7 @@ impl Opened {
             output_file::claim(&file)?;
             if is_at(&file, path) {
                 let before = made.map_or_else(|| Before::of(&file), Before::Absent);
-                return Ok(Self { file, path: path.into(), before });
+                return Ok(Self::with(file, path, before));
             }
         }
         Err(io::Error::other("others remove it again and again"))
@@ -93,7 +102,11 @@ impl Opened {
     /// A file that is open already, of which people are told under this name.
     pub fn of(file: File, path: &Path) -> Self {
         let before = Before::of(&file);
-        Self { file, path: path.into(), before }
+        Self::with(file, path, before)
+    }
+
+    fn with(file: File, path: &Path, before: Before) -> Self {
+        Self { file, path: path.into(), before, changed: Cell::default() }
     }
 
     /// As [`Self::open`], for a recording.
@@ -148,11 +161,20 @@ impl Opened {
         if limits::largest_file().is_some_and(|most| bytes > most) {
             return Err(Errno::FBIG.into());
         }
+        if self.changed.get().is_none() {
+            self.changed.set(Some(self.file.metadata()?.modified()?));
+        }
         match fallocate(&self.file, FallocateFlags::KEEP_SIZE, 0, bytes) {
             Err(full @ (Errno::NOSPC | Errno::DQUOT | Errno::FBIG)) => Err(full.into()),
             // Of a file system that cannot answer.
             _ => Ok(()),
         }
+    }
+
+    /// What was reserved behind the content, which was changed then, belongs to others again.
+    fn give_room_back(&self, changed: SystemTime) -> io::Result<()> {
+        self.file.set_len(self.file.metadata()?.len())?;
+        self.file.set_modified(changed)
     }
 
     /// Makes ready for a first piece of so many bytes, which is to be written at once, over the content if there is some.
@@ -172,36 +194,53 @@ impl Opened {
     /// # Errors
     /// Refusal by the system: the file has its content as before, or if even that is refused, nothing.
     pub(super) fn replace_content(&mut self, piece: &[u8]) -> io::Result<()> {
-        let length = self.file.metadata()?.len();
-        self.try_beside(piece)?;
+        self.replace_and_cut(piece, || self.cut(piece.len() as u64))
+            .map(|()| self.before = Before::Stays)
+            .or_else(|NotReplaced { why, is_as_before }| {
+                if !is_as_before {
+                    self.before = Before::Stays;
+                    self.cut(0)?;
+                }
+                Err(why)
+            })
+    }
+
+    /// Writes the piece over the content, has the rest cut off, and puts the first byte.
+    fn replace_and_cut(&self, piece: &[u8], cut: impl FnOnce() -> io::Result<()>) -> Result<(), NotReplaced> {
+        let as_before = |why| NotReplaced { why, is_as_before: true };
+        let length = self.file.metadata().map_err(as_before)?.len();
+        self.try_beside(piece).map_err(as_before)?;
         let replaced = self.contents_first(piece.len());
-        let written = (&self.file).write_all(piece).and_then(|()| self.cut(piece.len() as u64));
-        if written.is_ok() {
-            self.before = Before::Stays;
-            return Ok(());
-        }
-        let back = (&self.file).stream_position().and_then(|reached| {
-            let replaced = replaced?;
-            // What nobody has written over is not written again: that might be refused where this is not.
-            let reached = replaced.len().min(usize::try_from(reached).unwrap_or(usize::MAX));
-            (&self.file).rewind()?;
-            (&self.file).write_all(&replaced[..reached])?;
-            (&self.file).rewind()?;
-            self.cut(length)
-        });
-        if back.is_err() {
-            self.before = Before::Stays;
-            self.cut(0)?;
-        }
-        written
+        let Some((first, rest)) = piece.split_first() else { return cut().map_err(as_before) };
+        let written = (&self.file).write_all(&[HALF_REPLACED]).and_then(|()| (&self.file).write_all(rest));
+        written.and_then(|()| cut()).map_err(|why| {
+            let back = replaced.and_then(|replaced| self.put_back(&replaced, length));
+            NotReplaced { why, is_as_before: back.is_ok() }
+        })?;
+        let whole = self.file.write_all_at(&[*first], 0);
+        whole.map_err(|why| NotReplaced { why, is_as_before: false })
+    }
+
+    /// Writes of what was replaced as much as was written over, and cuts off what is behind the earlier content.
+    fn put_back(&self, replaced: &[u8], length: u64) -> io::Result<()> {
+        let reached = (&self.file).stream_position()?;
+        // What nobody has written over is not written again: that might be refused where this is not.
+        let reached = replaced.len().min(usize::try_from(reached).unwrap_or(usize::MAX));
+        (&self.file).rewind()?;
+        (&self.file).write_all(&replaced[..reached])?;
+        (&self.file).rewind()?;
+        self.cut(length)
     }
 
     /// Writes a piece into a file without a name beside this one, and gives it up again, on file systems that copy what is written
-    /// over: it takes the same room there as the piece over the content will, and costs nothing if there is none.
+    /// over: it takes the same room there as the piece over the content will, and its first byte once more, and costs nothing if
+    /// there is none.
     fn try_beside(&self, piece: &[u8]) -> io::Result<()> {
         const BTRFS: i64 = 0x9123_683e;
         const BCACHEFS: i64 = 0xca45_1a4e;
         const ZFS: i64 = 0x2fc1_2fc1;
+        /// At least as large as what a file system takes for a byte.
+        const BLOCK_BYTES: usize = 1 << 17;
         // A file system that does not say what it is is taken for a common one.
         let kind = rustix::fs::fstatfs(&self.file).map_or(0, |found| found.f_type);
         if ![BTRFS, BCACHEFS, ZFS].contains(&kind) {
@@ -212,7 +251,9 @@ impl Opened {
         let nameless = rustix::fs::open(directory, OFlags::TMPFILE | OFlags::WRONLY, Mode::RUSR | Mode::WUSR);
         // Where nobody may make a file the piece over the content tells.
         let Ok(trial) = nameless else { return Ok(()) };
-        File::from(trial).write_all(piece)
+        let mut trial = File::from(trial);
+        trial.write_all(piece)?;
+        trial.write_all(&[0; BLOCK_BYTES])
     }
 
     /// So many bytes of the content, or all of it if that is less.
@@ -243,6 +284,14 @@ impl Opened {
     pub(super) fn file(&self) -> &File {
         &self.file
     }
+}
+
+/// Refusal of a piece over a file's content.
+#[derive(Debug)]
+struct NotReplaced {
+    why: io::Error,
+    /// The content is there, to the byte.
+    is_as_before: bool,
 }
 
 impl Before {
@@ -340,6 +389,48 @@ mod tests {
         assert_eq!(read(), "earlier rows");
         drop(lines);
         assert_eq!(read(), "earlier rows");
+    }
+
+    /// A file of this content, opened for a recording.
+    fn with_content(content: &[u8]) -> (tempfile::TempDir, PathBuf, Opened) {
+        let directory = tempfile::tempdir().expect("a directory");
+        let path = directory.path().join("old");
+        std::fs::write(&path, content).expect("room");
+        let opened = Opened::open(&path).expect("opened");
+        (directory, path, opened)
+    }
+
+    #[test]
+    fn a_first_piece_is_no_recording_until_nothing_of_the_content_is_behind_it() {
+        for content in [&b"earlier rows, many of them"[..], b"few"] {
+            let (_directory, path, mut opened) = with_content(content);
+            let read = || std::fs::read(&path).expect("readable");
+            let half = [&b"\0ew rows"[..], content.get(8..).unwrap_or_default()].concat();
+            // Also where it has grown: what is behind the content is cut off again.
+            let refused = opened.replace_and_cut(b"new rows", || {
+                assert_eq!(read(), half);
+                Err(Errno::IO.into())
+            });
+            assert!(refused.expect_err("refused").is_as_before);
+            assert_eq!(read(), content);
+            opened.replace_content(b"new rows").expect("room");
+            drop(opened);
+            assert_eq!(read(), b"new rows");
+        }
+    }
+
+    #[test]
+    fn room_that_was_reserved_for_nothing_is_given_back_and_the_time_of_the_last_change_stays() {
+        let (_directory, path, opened) = with_content(b"earlier rows");
+        let found = || {
+            let found = path.metadata().expect("there");
+            (found.len(), found.blocks(), found.modified().expect("a time"))
+        };
+        let before = found();
+        opened.reserve(1 << 20).expect("room");
+        assert!(found().1 >= before.1);
+        drop(opened);
+        assert_eq!(found(), before);
     }
 
     #[test]

@@ -12,6 +12,7 @@ mod tick_order;
 
 use super::about::About;
 use super::destination::RunFormat;
+use super::opened::HALF_REPLACED;
 use crate::columns::Names;
 use crate::row::{BodyRow, Row};
 pub(crate) use csv_lines::CsvLines;
@@ -201,6 +202,9 @@ pub(crate) fn check_begin(file: &Path) -> Result<(), ReadError> {
     opened.map_err(|source| ReadError::Io { file: file.into(), source })?;
     let why = match &begin[..] {
         [] => Some("it is empty"),
+        [HALF_REPLACED, ..] => Some(
+            "whoever wrote it was killed while it took the place of an earlier one, and what it has may be of both",
+        ),
         begin if input_file::is_utf16(begin) => Some(input_file::UTF16),
         begin => file_kind::mistaken(begin),
     };

@@ -37,12 +37,12 @@ impl RecordFile {
         }
     }
 
-    /// Rows in the file itself; of events none is one.
+    /// Rows in the file itself, or events.
     pub(super) fn rows(&self) -> u64 {
         match self {
             Self::Csv(file) => file.rows(),
             Self::Mcap(file) => file.rows(),
-            Self::Events(_) => 0,
+            Self::Events(file) => file.rows(),
         }
     }
 

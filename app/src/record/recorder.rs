@@ -20,7 +20,7 @@ use io_driver::device::run_time_s;
 use io_driver::say::say;
 use std::collections::VecDeque;
 use std::path::{Path, PathBuf};
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::thread::{JoinHandle, Thread};
 use std::time::{Duration, Instant};
@@ -47,7 +47,7 @@ pub struct Recorded {
     pub rows: u64,
     /// Which of the two.
     pub unit: &'static str,
-    /// Rows that the recorder had no room for.
+    /// Of that unit, those that the recorder had no room for.
     pub lost: u64,
     /// Its thread was left behind in the middle of a write: more of the rows may have reached it.
     pub is_left_behind: bool,
@@ -62,6 +62,11 @@ impl Recorded {
     pub fn not_begun(error: &RecordingError) -> Self {
         let (path, failure) = (error.file().into(), Some(error.to_string()));
         Self { path, rows: 0, unit: "rows", lost: 0, is_left_behind: false, failure, is_as_before: false }
+    }
+
+    /// How many of its unit are missing, of a run that could not hand on so many rows.
+    pub fn missing(&self, rows_lost: u64) -> u64 {
+        if self.unit == EVENTS { self.lost } else { self.lost + rows_lost }
     }
 }
 
@@ -85,9 +90,9 @@ impl Subscriber for EventFeed {
             && !self.events.is_abandoned()
             && wait.goes_on(progress, &self.backpressure, &self.thread)
         {}
-        if !progress.is_given_up() {
-            self.events.send(*event);
-        }
+        let is_sent = !progress.is_given_up() && self.events.send(*event);
+        let count = if is_sent { &self.shared.events_sent } else { &self.shared.events_lost };
+        count.fetch_add(1, Ordering::Relaxed);
     }
 }
 
@@ -134,6 +139,9 @@ struct Shared {
     is_as_before: AtomicBool,
     /// The run did not begin, and the file is to be as it was.
     is_in_vain: AtomicBool,
+    /// Events that were handed over, and those that found no room.
+    events_sent: AtomicU64,
+    events_lost: AtomicU64,
 }
 
 impl Recorder {
@@ -347,7 +355,8 @@ impl Recorder {
             std::thread::sleep(Duration::from_millis(1));
         }
         line.end();
-        let Self { path, unit, lost, thread, given_up, shared, .. } = self;
+        let (_, lost) = self.sent_and_lost();
+        let Self { path, unit, thread, given_up, shared, .. } = self;
         let (rows, failure) = match thread.join() {
             Ok(Ok(rows)) => (rows, None),
             Ok(Err(error)) => {
@@ -361,8 +370,19 @@ impl Recorder {
         Recorded { path, rows, unit, lost, is_left_behind: false, failure, is_as_before }
     }
 
+    /// How many of the unit were handed over, and how many found no room.
+    fn sent_and_lost(&self) -> (u64, u64) {
+        if self.is_of_events() {
+            let [sent, lost] = [&self.shared.events_sent, &self.shared.events_lost];
+            (sent.load(Ordering::Relaxed), lost.load(Ordering::Relaxed))
+        } else {
+            (self.sent, self.lost)
+        }
+    }
+
     /// The thread ends with the process.
     fn leave_behind(self) -> Recorded {
+        let (sent, lost) = self.sent_and_lost();
         let why = self.given_up.unwrap_or_else(|| {
             let why = format!(
                 "cannot finish the recording {}: nothing was written for {} s; what reached it until now is readable",
@@ -377,7 +397,7 @@ impl Recorder {
             path: self.path,
             rows,
             unit: self.unit,
-            lost: self.lost + self.sent.saturating_sub(rows),
+            lost: lost + sent.saturating_sub(rows),
             is_left_behind: true,
             failure: Some(why),
             is_as_before: false,
