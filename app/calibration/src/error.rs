@@ -48,7 +48,8 @@ pub enum PairsError {
 pub enum CalibrationError {
     /// Not enough of them.
     #[error(
-        "found {found} pairs; a {model} transform needs at least {needed}, and 200 or more to average out the noise"
+        "found {found} {}; a {model} transform needs at least {needed}, and 200 or more to average out the noise",
+        if *found == 1 { "pair" } else { "pairs" }
     )]
     TooFew {
         /// How many there are.

@@ -516,7 +516,7 @@ fn devices_that_nobody_moves_or_that_are_not_there_are_refused() {
     let driver = driver(&place);
     // Without a commander the script does not play: the tips rest.
     for (arguments, words) in [
-        (&["--seconds", "0.5"][..], "found 1 pairs; a rigid transform needs at least 3"),
+        (&["--seconds", "0.5"][..], "found 1 pair; a rigid transform needs at least 3"),
         (&["--device", "5"], "the driver has no device 5; it has 0 (arm0), 1 (arm1)"),
     ] {
         let said = Running::start(live(&place, &driver, arguments)).wait();
@@ -527,7 +527,7 @@ fn devices_that_nobody_moves_or_that_are_not_there_are_refused() {
     let pairs = "fiducial_x_m,fiducial_y_m,fiducial_z_m,other_x_m,other_y_m,other_z_m\n0,0,0,1,1,1\n";
     for (file, text, words) in [
         ("table.csv", "tick,t\n1,0.001\n", "found a file that holds no pairs"),
-        ("pairs.csv", pairs, "found 1 pairs"),
+        ("pairs.csv", pairs, "found 1 pair"),
     ] {
         place.write(file, text);
         let arguments = ["--seconds", "0.5", "--save-pairs", file];
@@ -594,7 +594,7 @@ fn ctrl_c_ends_the_gathering_with_what_there_is() {
     let said = gathering.wait();
     // The tips rest, so one pair is what there is.
     assert_eq!(said.status, Some(2), "{said:?}");
-    assert!(said.err.contains("found 1 pairs"), "{}", said.err);
+    assert!(said.err.contains("found 1 pair"), "{}", said.err);
     let pairs = std::fs::read_to_string(place.path("pairs.csv")).expect("kept all the same");
     assert_eq!(pairs.lines().count(), 2);
 }

@@ -253,6 +253,29 @@ fn a_stop_that_gets_no_thread_asks_before_it_says_a_word() {
     assert_eq!(driver.wait().code(), Some(0));
 }
 
+/// Stops come faster than a log can be read.
+#[test]
+fn a_stop_that_stands_is_logged_once_however_often_and_by_whichever_way_it_is_asked_for() {
+    let directory = tempfile::tempdir().expect("a directory");
+    let [config, socket] = ["driver.toml", "driver.sock"].map(|name| directory.path().join(name));
+    std::fs::write(&config, resting("real", 1)).expect("room");
+    let mut command = programs::io_driver();
+    let mut driver =
+        Running::start(command.arg("run").arg("--config").arg(&config).arg("--socket").arg(&socket));
+    driver.hear("listening at");
+    const TIMES: usize = 3;
+    for _ in 0..TIMES {
+        for _ in 0..20 {
+            // Over a connection, and by datagram.
+            assert_eq!(io_driver(&["emergency-stop"], &socket).status, Some(0));
+        }
+        assert_eq!(io_driver(&["clear-fault"], &socket).status, Some(0));
+    }
+    assert_eq!(io_driver(&["stop"], &socket).status, Some(0));
+    let end = driver.end();
+    assert_eq!(end.err.matches("emergency stop, asked for by").count(), TIMES, "{end:?}");
+}
+
 /// Nobody answers the loop, so that it tells no newer frame.
 #[test]
 fn a_second_emergency_stop_of_a_driver_in_lockstep_that_waits_for_its_commander_is_seen() {
