@@ -13,6 +13,7 @@ use nalgebra::Vector3;
 use rt_core::plain_text::{PlainJson, PlainLines};
 use rt_core::{limits, replacement};
 use serde_json::{Value, json};
+use std::collections::BTreeMap;
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -177,9 +178,15 @@ impl Understood {
         text
     }
 
+    /// Names of the file's faces, each with the number of faces of the mesh that are called so.
+    fn faces_by_name(&self) -> Option<BTreeMap<&str, usize>> {
+        let kept = self.origins.iter().zip(&self.is_lid).filter(|(_, is_lid)| !**is_lid);
+        Some(self.names.as_ref()?.of_faces(kept.map(|(origin, _)| *origin)))
+    }
+
     /// Names for `[[entity.faces]]`.
     fn names(&self) -> Option<String> {
-        let all = self.names.as_ref()?.all();
+        let all = self.faces_by_name()?;
         let mut shown: Vec<String> =
             all.iter().take(MOST_NAMES).map(|(name, faces)| format!("{name} ({faces})")).collect();
         if all.len() > MOST_NAMES {
@@ -245,7 +252,7 @@ fn to_json(
             return json!({ "ok": false, "file": file, "problems": [{ "message": problem.words() }] });
         }
     };
-    let Understood { mesh, report, is_lid, names, low, high, area, volume, .. } = understood;
+    let Understood { mesh, report, is_lid, low, high, area, volume, .. } = understood;
     let holes: Vec<Value> = report
         .open_holes
         .largest
@@ -266,7 +273,7 @@ fn to_json(
             "open_holes": report.open_holes.count, "largest_open_holes": holes,
             "low": [low.x, low.y, low.z], "high": [high.x, high.y, high.z], "area": area,
             "volume": (mesh.sides() == Sides::Solid).then_some(volume),
-            "names": names.as_ref().map(FaceNames::all),
+            "names": understood.faces_by_name(),
         },
         "written": args.repair.as_ref().filter(|_| written.is_ok()).map(|out: &PathBuf| out.display().to_string()),
     })

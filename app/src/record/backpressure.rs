@@ -155,7 +155,11 @@ mod tests {
         })
     }
 
-    fn piped_as(pipe: &Path, patience: Duration, begin: impl FnOnce(Opened) -> RecordFile) -> (Recorder, File) {
+    fn piped_as(
+        pipe: &Path,
+        patience: Duration,
+        begin: impl FnOnce(Opened) -> RecordFile,
+    ) -> (Recorder, File) {
         let (kind, mode) = (rustix::fs::FileType::Fifo, rustix::fs::Mode::RUSR | rustix::fs::Mode::WUSR);
         rustix::fs::mknodat(rustix::fs::CWD, pipe, kind, mode, 0).expect("a pipe");
         let without_waiting = OFlags::NONBLOCK.bits().cast_signed();
@@ -228,7 +232,10 @@ mod tests {
         let recorded = recorder.finish();
         assert_eq!((recorded.unit, recorded.rows + recorded.lost), ("events", sent));
         let line = recording_line(&recorded, 12);
-        let told = format!("({} events at least, {} LOST at most: its reader was too slow)", recorded.rows, recorded.lost);
+        let told = format!(
+            "({} events at least, {} LOST at most: its reader was too slow)",
+            recorded.rows, recorded.lost
+        );
         assert!(line.contains(&told), "{line}");
     }
 

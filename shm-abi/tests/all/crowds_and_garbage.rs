@@ -48,7 +48,8 @@ fn who_leaves_without_taking_what_was_handed_over_keeps_the_place() {
         streams.iter().filter(|stream| verdict_after_shutdown(stream) == Some(Verdict::Granted)).count()
     };
     // Neither takes the other's places, whichever asks first.
-    for order in [[RequestKind::Observe, RequestKind::Command], [RequestKind::Command, RequestKind::Observe]] {
+    for order in [[RequestKind::Observe, RequestKind::Command], [RequestKind::Command, RequestKind::Observe]]
+    {
         let left = order.map(|kind| {
             let places = if kind == RequestKind::Observe { OBSERVERS } else { COMMANDERS }.of_process;
             let streams: Vec<_> = (0..places + 6).map(|_| leave_behind(&mut desk, kind)).collect();

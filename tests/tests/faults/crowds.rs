@@ -57,12 +57,11 @@ fn with_every_place_taken_the_motors_are_stopped_all_the_same() {
     RingLog::begin(stand.view()).follow_to_force(stand.view());
     let name = stand.socket().to_str().expect("plain").to_owned();
     // The stand's own observer has a place as well.
-    let crowd =
-        [OBSERVERS.of_process, OBSERVERS.of_user - OBSERVERS.of_process - 1].map(|count| {
-            let mut looker = Running::start(&mut myself(EVERY_PLACE, &name));
-            looker.hear(&format!("{count} places"));
-            looker
-        });
+    let crowd = [OBSERVERS.of_process, OBSERVERS.of_user - OBSERVERS.of_process - 1].map(|count| {
+        let mut looker = Running::start(&mut myself(EVERY_PLACE, &name));
+        looker.hear(&format!("{count} places"));
+        looker
+    });
     let silent: Vec<_> =
         (0..2 * MAX_ASKING).filter_map(|_| UnixStream::connect(stand.socket()).ok()).collect();
     client::observe(&stand.socket(), "test").expect_err("no place");

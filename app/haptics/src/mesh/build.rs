@@ -76,7 +76,7 @@ impl Mesh {
             report.flipped = flipped;
         }
         let copies = pinch::part(&mut triangles, &links, &mut vertices);
-        if fold::unfold(&mut triangles, &links, &vertices, &copies, &mut report.unfolded) {
+        if fold::unfold(&mut triangles, (&links, &parts), &vertices, &copies, &mut report.unfolded) {
             if triangles.is_empty() {
                 return Err(MeshError::OnlySlivers { faces: faces_before });
             }

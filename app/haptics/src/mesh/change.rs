@@ -8,7 +8,7 @@
 //! more than that, in all.
 //! Cost: of a change, square in the faces around a corner of a sliver, of which there are [`MOST_AROUND`] at most.
 
-use super::fold::{is_folded_over, is_sliver};
+use super::fold::{Thin, is_folded_over};
 use super::order::{Curve, Triangle};
 use super::repair::{area_vector, has_area};
 use nalgebra::Vector3;
@@ -50,7 +50,7 @@ const ROUNDING: f64 = 1e-9;
 /// Faces on their way to be changed.
 pub(super) struct Changing<'a> {
     vertices: &'a [Vector3<f64>],
-    widest_m: f64,
+    thin: Thin,
     corners: Vec<[u32; 3]>,
     /// For each face the one whose piece it is now, or [`GONE`].
     piece_of: Vec<u32>,
@@ -76,7 +76,7 @@ impl<'a> Changing<'a> {
         triangles: &[Triangle],
         vertices: &'a [Vector3<f64>],
         copies: &[u32],
-        widest_m: f64,
+        thin: Thin,
     ) -> Self {
         let corners: Vec<[u32; 3]> = triangles.iter().map(|triangle| triangle.corners).collect();
         let mut starts = vec![0_u32; vertices.len() + 1];
@@ -105,7 +105,7 @@ impl<'a> Changing<'a> {
         let (changed, moved_m) = Default::default();
         Self {
             vertices,
-            widest_m,
+            thin,
             corners,
             piece_of,
             starts,
@@ -139,7 +139,7 @@ impl<'a> Changing<'a> {
         others.next().copied().filter(|_| others.next().is_none())
     }
 
-    /// The change at a folded sliver that leaves the least; `None` if there is none that helps, or it is no folded sliver.
+    /// The change at a folded sliver that leaves the least; `None` if there is none that helps, or it is not folded.
     pub(super) fn best(&self, face: u32) -> Option<Change> {
         if self.piece_of[face as usize] == GONE || !self.is_folded(face) {
             return None;
@@ -159,13 +159,13 @@ impl<'a> Changing<'a> {
     }
 
     fn is_folded(&self, face: u32) -> bool {
-        let corners = self.corners[face as usize];
+        let (corners, piece) = (self.corners[face as usize], self.piece_of[face as usize]);
         let points = self.at(&corners);
-        is_sliver(&points, self.widest_m)
-            && (0..3).any(|edge| {
-                let other = self.beyond(face, corners[edge], corners[(edge + 1) % 3]);
-                other.is_some_and(|other| is_folded_over(&points, &self.at(&self.corners[other as usize])))
-            })
+        (0..3).any(|edge| {
+            let other = self.beyond(face, corners[edge], corners[(edge + 1) % 3]);
+            let others = other.map(|other| self.at(&self.corners[other as usize]));
+            others.is_some_and(|others| self.thin.is_folded(piece as usize, &points, &others))
+        })
     }
 
     /// Thickness of the layer, parallel to the largest of some faces, that all of them lie in.
@@ -185,7 +185,7 @@ impl<'a> Changing<'a> {
         let [from, to, opposite] = self.at(&[a, b, p]);
         let other = self.beyond(face, a, b)?;
         let far_m = distance_to_segment(&opposite, &from, &to).min(self.thickness_m(&[face, other]));
-        if far_m > self.widest_m {
+        if far_m > self.thin.widest_m {
             return None;
         }
         let c = apex(&self.corners[other as usize], b, a)?;
@@ -209,7 +209,7 @@ impl<'a> Changing<'a> {
         let far_m = (self.vertices[from as usize] - self.vertices[to as usize]).norm();
         let far_m = far_m.min(self.thickness_m(&before));
         let moved_m = far_m + self.moved_m.get(&from).copied().unwrap_or(0.0);
-        if moved_m > self.widest_m {
+        if moved_m > self.thin.widest_m {
             return None;
         }
         self.change(before, after, Some((to, moved_m)))

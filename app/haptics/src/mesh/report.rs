@@ -209,7 +209,7 @@ impl fmt::Display for MeshReport {
             let faces = plural(self.crossed, "face", "faces");
             write!(
                 f,
-                "\n{} {faces} crossed by others: felt as far as they are outside of these",
+                "\n{} {faces} that others cross or touch: felt as far as they are outside of these",
                 self.crossed
             )?;
         }

@@ -8,13 +8,13 @@ use nalgebra::Vector3;
 use std::sync::Arc;
 
 /// A slab on four corners whose top is divided along the x axis; on that edge there is a vertex `off_m` to the side, beyond which
-/// its sliver is folded over.
-fn folded(off_m: f64, along: f64) -> (Mesh, MeshReport) {
+/// its sliver is folded over, and so high above the slab.
+fn folded(off_m: f64, along: f64, up_m: f64) -> (Mesh, MeshReport) {
     const HALF_M: f64 = 0.03;
     let ring = [[-HALF_M, 0.0], [0.0, -HALF_M], [HALF_M, 0.0], [0.0, HALF_M]];
     let mut vertices: Vec<_> =
         [0.0, -0.01].iter().flat_map(|y| ring.map(|[x, z]| Vector3::new(x, *y, z))).collect();
-    vertices.push(Vector3::new(along * HALF_M, 0.0, -off_m));
+    vertices.push(Vector3::new(along * HALF_M, up_m, -off_m));
     let (a, c, b, d, p) = (0, 1, 2, 3, 8);
     let mut faces = vec![[b, a, c], [a, b, p], [a, p, d], [p, b, d]];
     for i in 0..4 {
@@ -31,7 +31,7 @@ fn folded(off_m: f64, along: f64) -> (Mesh, MeshReport) {
 fn a_sliver_that_is_folded_over_its_neighbour_is_unfolded() {
     for off_m in [1e-12, 1e-9, 5e-7, 5e-6] {
         for along in [-0.9, -0.2, 0.0, 0.6] {
-            let (mesh, report) = folded(off_m, along);
+            let (mesh, report) = folded(off_m, along, 0.0);
             assert_eq!((report.unfolded.count, report.is_clean()), (1, false), "{off_m} {along}: {report}");
             let on_top = mesh
                 .faces()
@@ -43,7 +43,7 @@ fn a_sliver_that_is_folded_over_its_neighbour_is_unfolded() {
     }
     // What can be seen is as the model has it, and what lies flat is no fold.
     for off_m in [2e-5, 1e-3, -5e-7, -1e-3] {
-        let (_, report) = folded(off_m, 0.1);
+        let (_, report) = folded(off_m, 0.1, 0.0);
         assert_eq!(report.unfolded.count, 0, "{off_m}: {report}");
     }
 }
@@ -132,9 +132,30 @@ fn a_point_that_is_stroked_over_a_fold_is_free_when_it_is_lifted() {
     for seed in 0..400 {
         let mut noise = Noise(seed);
         let off_m = 10f64.powf(noise.between(-12.0, -5.3));
-        let (mesh, _) = folded(off_m, noise.between(-0.9, 0.9));
+        let (mesh, _) = folded(off_m, noise.between(-0.9, 0.9), 0.0);
         let entity = touchable(&Arc::new(mesh), Friction::None);
         stroke_and_lift(seed, &entity, &mut noise, [0.015, 2e-3], 60);
+    }
+}
+
+/// A flap over a slit that no finger feels, however wide.
+#[test]
+fn a_flap_over_a_slit_is_unfolded_and_a_point_that_is_stroked_over_it_is_free_when_it_is_lifted() {
+    for seed in 0..400 {
+        let mut noise = Noise(seed);
+        let [off_m, up_m] =
+            [(-5.0, -2.7), (-9.0, -5.3)].map(|(low, high)| 10f64.powf(noise.between(low, high)));
+        // Where it dips below the face beside it the slit is on its other side, and up to 20 times as wide.
+        let up_m = if seed % 4 == 0 { -up_m / 20.0 } else { up_m };
+        let (mesh, report) = folded(off_m, noise.between(-0.9, 0.9), up_m);
+        assert_eq!(report.unfolded.count, 1, "{seed}, {off_m}, {up_m}: {report}");
+        let entity = touchable(&Arc::new(mesh), Friction::None);
+        stroke_and_lift(seed, &entity, &mut noise, [0.015, 4e-3], 60);
+    }
+    // A slit that is felt is as the model has it.
+    for up_m in [1e-5, 1e-4] {
+        let (_, report) = folded(1e-3, 0.1, up_m);
+        assert_eq!(report.unfolded.count, 0, "{up_m}: {report}");
     }
 }
 

@@ -71,8 +71,13 @@ impl FaceNames {
 
     /// All names, in alphabetical order, each with the number of faces that are called so.
     pub fn all(&self) -> BTreeMap<&str, usize> {
+        self.of_faces(0..self.of_face.len())
+    }
+
+    /// All names, each with the number of these faces that are called so.
+    pub fn of_faces(&self, those: impl Iterator<Item = usize>) -> BTreeMap<&str, usize> {
         let mut faces = vec![0_usize; self.sets.len()];
-        self.of_face.iter().for_each(|set| faces[*set as usize] += 1);
+        those.filter_map(|face| self.of_face.get(face)).for_each(|set| faces[*set as usize] += 1);
         let mut all = BTreeMap::new();
         for (set, faces) in self.sets.iter().zip(faces) {
             let once: std::collections::BTreeSet<&str> = set.iter().map(String::as_str).collect();

@@ -2,8 +2,8 @@
 //!
 //! Read: of the element `vertex` the properties `x`, `y` and `z`, of any kind of number; of `face` the list `vertex_indices`
 //! or `vertex_index`, polygons with any number of corners; of `tristrips` the list of the same name, in which -1 begins a
-//! new strip. Other elements and properties (colours, normals, qualities) are passed over, whatever they hold. Elements may
-//! come in any order.
+//! new strip. Other elements and properties (colours, normals, qualities) are passed over, whatever they hold, and in a text
+//! with a line for each instance also what follows the last property. Elements may come in any order.
 //!
 //! Nothing is reserved for what the header promises: how many bytes that takes at least is compared with what is there,
 //! before anything is read.
@@ -84,6 +84,7 @@ impl Read {
                     (_, kind) => source.skip(kind)?,
                 }
             }
+            source.end_instance();
             self.vertices.push(vertex);
         }
         Ok(())
@@ -93,7 +94,8 @@ impl Read {
         let promised = self.promised;
         each_list(element, source, |source, count, number| {
             if count < 3 {
-                return Err(source.wrong(&format!("a face of {count} corners"), "three corners or more"));
+                let corners = if count == 1 { "corner" } else { "corners" };
+                return Err(source.wrong(&format!("a face of {count} {corners}"), "three corners or more"));
             }
             for _ in 0..count {
                 let index = source.number(number)?;
@@ -177,6 +179,7 @@ fn each_list(
                 kind => source.skip(kind)?,
             }
         }
+        source.end_instance();
     }
     Ok(())
 }
@@ -187,6 +190,7 @@ fn skip(element: &Element, source: &mut Source<'_>) -> Result<(), ModelError> {
     }
     for _ in 0..element.count {
         element.properties.iter().try_for_each(|property| source.skip(property.kind))?;
+        source.end_instance();
     }
     Ok(())
 }

@@ -32,7 +32,7 @@ impl<'t> Words<'t> {
         Some(&rest[..length])
     }
 
-    /// The rest of the line is a name.
+    /// Passes over the rest of the last word's line, as of a name.
     pub(super) fn skip_line(&mut self) {
         let rest = &self.text[self.at..];
         self.at += rest.iter().position(|&byte| byte == b'\n').unwrap_or(rest.len());

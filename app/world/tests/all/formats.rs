@@ -140,6 +140,8 @@ fn every_way_to_write_a_square_as_ply_is_the_same() {
         PLY.replace("element face", "element edge 2\nproperty int a\nproperty list int float b\nelement empty 4000000000\nelement face")
             .replace("4 0 1 2 3", "1 0\n2 2 0.5 nan\n4 0 1 2 3"),
         PLY.replace("element face 1\n", "element face 0\n").replace("end_header", "element tristrips 1\nproperty list int int vertex_indices\nend_header").replace("4 0 1 2 3", "5 -1 0 1 2 -1\n").replace("element tristrips 1", "element tristrips 2").trim_end().to_owned() + "\n3 0 2 3\n",
+        // A line for each, and more on it than the header says, as MeshLab writes colours of corners.
+        PLY.replace("4 0 1 2 3", "4 0 1 2 3 9 1 1 1 1 1 1 1 1 1").replace("1 1 0", "1 1 0 255"),
         faces_first.to_owned(),
     ];
     for way in ways {
@@ -270,8 +272,8 @@ fn what_is_wrong_with_a_ply_is_told_with_its_line_or_byte() {
         ),
         (
             "4 0 1 2 3",
-            "4 0 1 2 3 3 0",
-            "line 14: found `3`; allowed: the end of the file, or larger numbers in the header",
+            "4 0 1 2 3\n3 0",
+            "line 15: found `3`; allowed: the end of the file, or larger numbers in the header",
         ),
     ];
     for (from, to, message) in cases {

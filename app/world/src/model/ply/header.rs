@@ -95,6 +95,12 @@ impl Header {
         Ok(Self { encoding, elements, end: at, lines: line })
     }
 
+    /// Of all elements that have properties.
+    pub(super) fn instances(&self) -> Option<u64> {
+        let counts = self.elements.iter().filter(|element| !element.properties.is_empty());
+        counts.map(|element| element.count).try_fold(0_u64, u64::checked_add)
+    }
+
     pub(super) fn count_of(&self, name: &str) -> u64 {
         self.elements.iter().find(|element| element.name == name).map_or(0, |element| element.count)
     }

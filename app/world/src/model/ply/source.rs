@@ -7,6 +7,8 @@ use crate::model::{ModelError, shown};
 pub(super) enum Source<'b> {
     Text {
         words: Words<'b>,
+        /// There is a line for each instance.
+        is_by_line: bool,
     },
     Binary {
         bytes: &'b [u8],
@@ -21,7 +23,12 @@ pub(super) enum Source<'b> {
 impl<'b> Source<'b> {
     pub(super) fn new(header: &Header, bytes: &'b [u8]) -> Self {
         match header.encoding {
-            Encoding::Text => Self::Text { words: Words::from_line(&bytes[header.end..], header.lines + 1) },
+            Encoding::Text => {
+                let rest = &bytes[header.end..];
+                let lines = rest.split(|byte| *byte == b'\n').filter(|line| !line.trim_ascii().is_empty());
+                let is_by_line = header.instances() == Some(lines.count() as u64);
+                Self::Text { words: Words::from_line(rest, header.lines + 1), is_by_line }
+            }
             encoding => Self::Binary {
                 bytes,
                 at: header.end,
@@ -34,7 +41,7 @@ impl<'b> Source<'b> {
     /// It may be no number, or infinite.
     pub(super) fn number(&mut self, number: Number) -> Result<f64, ModelError> {
         match self {
-            Self::Text { words } => {
+            Self::Text { words, .. } => {
                 let word = words.next();
                 let value = word.and_then(|word| std::str::from_utf8(word).ok()?.parse().ok());
                 value.ok_or_else(|| words.wrong(word, "a number"))
@@ -68,7 +75,7 @@ impl<'b> Source<'b> {
         };
         match self {
             Self::Binary { .. } => self.take(count as usize * item.bytes()).map(drop),
-            Self::Text { words } => {
+            Self::Text { words, .. } => {
                 for _ in 0..count {
                     words.next().ok_or_else(|| words.wrong(None, "as many numbers as the header says"))?;
                 }
@@ -77,10 +84,17 @@ impl<'b> Source<'b> {
         }
     }
 
+    /// Passes over what a line has behind the last property that the header names: MeshLab writes colours of corners there.
+    pub(super) fn end_instance(&mut self) {
+        if let Self::Text { words, is_by_line: true } = self {
+            words.skip_line();
+        }
+    }
+
     /// Nothing may follow.
     pub(super) fn end(&mut self) -> Result<(), ModelError> {
         let found = match self {
-            Self::Text { words } => words.next().map(shown),
+            Self::Text { words, .. } => words.next().map(shown),
             Self::Binary { bytes, at, last, .. } => {
                 *last = *at;
                 let rest = bytes[*at..].trim_ascii_end();
@@ -96,7 +110,7 @@ impl<'b> Source<'b> {
     pub(super) fn wrong(&self, found: &str, allowed: &str) -> ModelError {
         let (found, allowed) = (found.into(), allowed.into());
         match self {
-            Self::Text { words } => ModelError::Line { line: words.line(), found, allowed },
+            Self::Text { words, .. } => ModelError::Line { line: words.line(), found, allowed },
             Self::Binary { last, .. } => ModelError::Byte { offset: *last, found, allowed },
         }
     }
