@@ -37,6 +37,8 @@ pub(crate) struct Pad {
     /// Into the body.
     pub(crate) inward_W: Vector3<f64>,
     pub(crate) normal_n: f64,
+    /// Along the surface, in size.
+    pub(crate) across_n: f64,
     pub(crate) circle: Circle,
 }
 
@@ -166,7 +168,8 @@ mod tests {
     use super::*;
 
     fn pad(finger: usize, at: [f64; 3], inward: [f64; 3], normal_n: f64) -> Pad {
-        Pad { finger, point_W: at.into(), inward_W: inward.into(), normal_n, circle: Circle::default() }
+        let (point_W, inward_W) = (at.into(), inward.into());
+        Pad { finger, point_W, inward_W, normal_n, ..Pad::default() }
     }
 
     #[test]

@@ -14,6 +14,7 @@ use crate::attach::{Attachment, Bond, ROWS_OF_BOND, TiedFinger};
 use crate::body::Body;
 use crate::gimbal::Gimbal;
 use crate::grasp_axis::{AxisMemory, GraspAxis, Hung, Pad, opposed};
+use crate::limit_surface::{Shares, Slip};
 use crate::roster::Roster;
 use crate::row::Row;
 use crate::soft_finger::SoftFinger;
@@ -88,6 +89,19 @@ struct Memory {
     turn_W: Option<Vector3<f64>>,
     pads: [PadMemory; MAX_PADS],
     bond: Option<Bond>,
+    /// Its HIP in the last tick \[m\], and how fast it moves \[m/s\].
+    hip_W: Option<Vector3<f64>>,
+    velocity_W: Vector3<f64>,
+}
+
+impl Memory {
+    /// Takes note of where the finger is in this tick.
+    fn move_to(&mut self, tick: &FingerTick, dt_s: f64) {
+        let is_number = |v_W: &Vector3<f64>| v_W.iter().all(|x| x.is_finite());
+        let last_W = self.hip_W.replace(tick.hip_W);
+        let difference_W = last_W.map(|last_W| (tick.hip_W - last_W) / dt_s);
+        self.velocity_W = tick.hip_velocity_W.or(difference_W).filter(is_number).unwrap_or_default();
+    }
 }
 
 /// A pad's memory of what it touches.
@@ -95,6 +109,7 @@ struct Memory {
 struct PadMemory {
     body: Option<usize>,
     twist: Twist,
+    slip: Slip,
     /// The touch's row in this tick.
     row: Option<usize>,
 }
@@ -146,6 +161,9 @@ impl Hand {
         for (index, finger) in self.fingers.iter_mut().enumerate() {
             let orientation = ticks.get(index).and_then(|tick| tick.gimbal);
             finger.turn_W = finger.gimbal.turn_W(orientation);
+            if let Some(tick) = ticks.get(index) {
+                finger.move_to(tick, start.dt_s);
+            }
             finger.pads.iter_mut().for_each(|pad| pad.row = None);
         }
         for place in 0..start.roster.awake().len() {
@@ -173,7 +191,8 @@ impl Hand {
             let normal_n = touch.normal_W.dot(&touch.force_on_user_W).max(0.0);
             let circle = finger.settings.soft.circle(touch, &start.entities[touch.entity], normal_n);
             let (point_W, inward_W) = (touch.point_W, -touch.normal_W);
-            pads[count] = Pad { finger: touch.finger, point_W, inward_W, normal_n, circle };
+            let across_n = (touch.force_on_user_W - touch.normal_W * normal_n).norm();
+            pads[count] = Pad { finger: touch.finger, point_W, inward_W, normal_n, across_n, circle };
             at[count] = row;
             count += 1;
         }
@@ -185,7 +204,7 @@ impl Hand {
                 _ if of == j => Some(pads[i].finger),
                 _ => None,
             });
-            self.press(pad, partner, (body, &start.bodies[place]), at[of], rows);
+            self.press(pad, partner, (body, &start.bodies[place]), &mut rows[at[of]], (at[of], start.dt_s));
         }
         self.held[body] = pair.map(|(i, j)| axis_of(&pads[i], &pads[j]));
         match pair {
@@ -194,19 +213,19 @@ impl Hand {
         }
     }
 
-    /// Torsional friction of one pad about its own normal.
+    /// Torsional friction of one pad about its own normal, and what it leaves of the other friction.
     fn press(
         &mut self,
         pad: &Pad,
         partner: Option<usize>,
         (body, state): (usize, &Body),
-        row: usize,
-        rows: &mut [Row],
+        row: &mut Row,
+        (number, dt_s): (usize, f64),
     ) {
         let partner_W = partner.and_then(|partner| self.fingers[partner].turn_W);
         let finger = &mut self.fingers[pad.finger];
         let soft = finger.settings.soft;
-        let hold = Hold {
+        let mut hold = Hold {
             stiffness_nm_per_rad: soft.stiffness_nm_per_rad,
             damping_nm_s_per_rad: soft.damping_nm_s_per_rad,
             most_nm: soft.most_nm(&pad.circle),
@@ -218,11 +237,29 @@ impl Hand {
         };
         let memory = &mut finger.pads[place];
         if known.is_none() {
-            *memory = PadMemory { body: Some(body), twist: Twist::begin(state.orientation), row: None };
+            let twist = Twist::begin(state.orientation);
+            *memory = PadMemory { body: Some(body), twist, ..PadMemory::default() };
         }
-        memory.row = Some(row);
-        memory.twist.carry(&state.orientation, &pad.inward_W, &turn_W.unwrap_or_default());
-        rows[row].torsion = memory.twist.torsion(&hold);
+        memory.row = Some(number);
+        let turn_W = turn_W.unwrap_or_default();
+        memory.twist.carry(&state.orientation, &pad.inward_W, &turn_W);
+        let (most_n, most_nm) = (pad.circle.most_n(), hold.most_nm);
+        if soft.shares() && most_n > 0.0 {
+            let asked_nm = memory.twist.asked_nm(hold.stiffness_nm_per_rad).abs();
+            let asked = Shares { friction: pad.across_n / most_n, torsion: asked_nm / most_nm };
+            let arm_W = pad.point_W - state.centre_W;
+            let moving_W = state.velocity_W + state.angular_velocity_W().cross(&arm_W);
+            let slip_W = moving_W - finger.velocity_W;
+            let slip_W = slip_W - pad.inward_W * pad.inward_W.dot(&slip_W);
+            let turned_rad = pad.inward_W.dot(&(state.angular_velocity_W() * dt_s - turn_W));
+            let slid_m =
+                Shares { friction: slip_W.norm() * dt_s, torsion: turned_rad.abs() * (most_nm / most_n) };
+            let left = memory.slip.shares(&asked, &slid_m);
+            hold.most_nm *= left.torsion;
+            let mu = left.friction * most_n / pad.normal_n;
+            (row.mu_hold, row.mu_slide) = (row.mu_hold.min(mu), row.mu_slide.min(mu));
+        }
+        row.torsion = memory.twist.torsion(&hold);
     }
 
     /// What two pads that hold a body between them do about the line that joins them.

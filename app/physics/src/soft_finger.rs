@@ -5,7 +5,8 @@
 //! Model: the area `A = pi r^2` of a touch's friction circle stands for the pressed area of the pad. Three ways to make use
 //! of it, see [`TorsionModel`]. Where a touch has no friction circle (another algorithm than the friction cone), a share of
 //! the normal force stands in: `r = share N / k`.
-//! Turning and sliding share nothing: a touch that slides resists turning as one that holds.
+//! Turning and sliding share what the pad of the `coulomb` model can bear ([`LimitSurface`]); to the other models a touch that
+//! slides resists turning as one that holds.
 //! Frames and signs: about the touch's normal (`coulomb`), or about the grasp axis (see [`crate::GraspAxis`]).
 //! Invariant: parameters are checked when they are set; torques never exceed what is said here.
 
@@ -13,6 +14,7 @@ use std::f64::consts::PI;
 
 use haptics::{Algorithm, Entity, ParameterError};
 
+use crate::limit_surface::LimitSurface;
 use crate::mass::positive;
 use crate::touch::{Touch, friction_circle_m};
 
@@ -27,6 +29,8 @@ pub enum TorsionModel {
     Coulomb {
         /// Radius of the pressed pad \[m\].
         pad_radius_m: f64,
+        /// What it bears of that while it is pulled along, and along while it is turned.
+        limit_surface: LimitSurface,
     },
     /// The torque of gravity about the grasp axis counts less by the share `A / critical` (Melder eq. 5.16), and turning is
     /// damped; from the critical area on nothing turns.
@@ -56,7 +60,7 @@ impl TorsionModel {
     pub fn of_name(name: &str) -> Option<Self> {
         Some(match name {
             "none" => Self::None,
-            "coulomb" => Self::Coulomb { pad_radius_m: PAD_RADIUS_M },
+            "coulomb" => Self::Coulomb { pad_radius_m: PAD_RADIUS_M, limit_surface: LimitSurface::Ellipse },
             "viscous" => {
                 Self::Viscous { critical_area_m2: AREA_M2, damping_nm_s_per_rad: VISCOUS_NM_S_PER_RAD }
             }
@@ -89,7 +93,7 @@ impl Default for SoftFinger {
     /// Coulomb, with a pad of 6 mm.
     fn default() -> Self {
         Self {
-            model: TorsionModel::Coulomb { pad_radius_m: PAD_RADIUS_M },
+            model: TorsionModel::Coulomb { pad_radius_m: PAD_RADIUS_M, limit_surface: LimitSurface::Ellipse },
             stiffness_nm_per_rad: 0.5,
             damping_nm_s_per_rad: 2e-3,
             normal_share: 0.5,
@@ -122,7 +126,7 @@ impl SoftFinger {
     pub fn validated(self) -> Result<Self, ParameterError> {
         match self.model {
             TorsionModel::None => {}
-            TorsionModel::Coulomb { pad_radius_m } => {
+            TorsionModel::Coulomb { pad_radius_m, .. } => {
                 positive("pad_radius_m", pad_radius_m)?;
             }
             TorsionModel::Viscous { critical_area_m2, damping_nm_s_per_rad } => {
@@ -170,11 +174,14 @@ impl SoftFinger {
     /// The most that a touch with this circle holds about its own normal \[N m\].
     pub(crate) fn most_nm(&self, circle: &Circle) -> f64 {
         match self.model {
-            TorsionModel::Coulomb { pad_radius_m } => {
-                EVENLY * pad_radius_m * circle.stiffness_n_per_m * circle.radius_m
-            }
+            TorsionModel::Coulomb { pad_radius_m, .. } => EVENLY * pad_radius_m * circle.most_n(),
             _ => 0.0,
         }
+    }
+
+    /// Whether friction and torsion of a touch share what it can bear.
+    pub(crate) fn shares(&self) -> bool {
+        matches!(self.model, TorsionModel::Coulomb { limit_surface: LimitSurface::Ellipse, .. })
     }
 
     /// Whether what is held follows a gimbal.
@@ -192,6 +199,11 @@ pub(crate) struct Circle {
 }
 
 impl Circle {
+    /// The most that friction bears there \[N\].
+    pub(crate) fn most_n(&self) -> f64 {
+        self.stiffness_n_per_m * self.radius_m
+    }
+
     /// A \[m^2\].
     pub(crate) fn area_m2(&self) -> f64 {
         PI * self.radius_m * self.radius_m
@@ -221,7 +233,10 @@ mod tests {
 
     #[test]
     fn parameters_that_no_finger_has_are_refused_by_name() {
-        let coulomb = |pad_radius_m| SoftFinger::default().with_model(TorsionModel::Coulomb { pad_radius_m });
+        let coulomb = |pad_radius_m| {
+            let limit_surface = LimitSurface::default();
+            SoftFinger::default().with_model(TorsionModel::Coulomb { pad_radius_m, limit_surface })
+        };
         assert_eq!(
             coulomb(0.0).validated().unwrap_err().to_string(),
             "pad_radius_m is 0; allowed is a finite number > 0"

@@ -51,10 +51,15 @@ impl Twist {
         }
     }
 
+    /// Torque of the spring that holds, before any limit \[N m\].
+    pub(crate) fn asked_nm(&self, stiffness_nm_per_rad: f64) -> f64 {
+        -stiffness_nm_per_rad * self.angle_rad
+    }
+
     /// What it does in this tick.
     pub(crate) fn torsion(&self, hold: &Hold) -> Torsion {
         Torsion {
-            rest_nm: -hold.stiffness_nm_per_rad * self.angle_rad,
+            rest_nm: self.asked_nm(hold.stiffness_nm_per_rad),
             stiffness_nm_per_rad: hold.stiffness_nm_per_rad,
             damping_nm_s_per_rad: hold.damping_nm_s_per_rad,
             most_nm: hold.most_nm,

@@ -5,7 +5,7 @@ use io_driver::say::say;
 use physics::collide::{self, can_move, is_collidable};
 use physics::{
     Attachment, Body, BodyError, ContactStiffness, Contacts, FingerSettings, HeldOrientation, Integrator,
-    MassProperties, Response, Settings, Sleep, SoftFinger, TorsionModel,
+    LimitSurface, MassProperties, Response, Settings, Sleep, SoftFinger, TorsionModel,
 };
 use world::{
     AttachSpec, AttachedOrientation, ContactStiffnessSpec, IntegratorSpec, MassSpec, MotionSpec,
@@ -200,8 +200,14 @@ fn soft_finger(spec: &SoftSpec) -> Result<SoftFinger, ParameterError> {
     };
     let set = |place: &mut f64, value: Option<f64>| *place = value.unwrap_or(*place);
     match (&mut model, spec.model) {
-        (TorsionModel::Coulomb { pad_radius_m }, SoftModelSpec::Coulomb { pad_radius_m: given }) => {
+        (
+            TorsionModel::Coulomb { pad_radius_m, limit_surface },
+            SoftModelSpec::Coulomb { pad_radius_m: given, is_uncoupled },
+        ) => {
             set(pad_radius_m, given);
+            if is_uncoupled {
+                *limit_surface = LimitSurface::Uncoupled;
+            }
         }
         (
             TorsionModel::Viscous { critical_area_m2, damping_nm_s_per_rad },

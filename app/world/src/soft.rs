@@ -28,6 +28,8 @@ pub enum SoftModelSpec {
     Coulomb {
         /// Of the pressed pad (m).
         pad_radius_m: Option<f64>,
+        /// Whether it bears friction and torsion in full at once, as the thesis has it.
+        is_uncoupled: bool,
     },
     /// As Melder's eq. 5.16 has it.
     Viscous {
@@ -49,7 +51,7 @@ pub enum SoftModelSpec {
 
 impl Default for SoftModelSpec {
     fn default() -> Self {
-        Self::Coulomb { pad_radius_m: None }
+        Self::Coulomb { pad_radius_m: None, is_uncoupled: false }
     }
 }
 
@@ -85,7 +87,13 @@ impl SoftSpec {
                 critical_area_turning_m2: number("critical_area_turning_m2", Bound::Positive)?,
                 viscous_damping_n_m_s_per_rad: number(damping, Bound::NotNegative)?,
             },
-            _ => SoftModelSpec::Coulomb { pad_radius_m: number("pad_radius_m", Bound::Positive)? },
+            _ => {
+                let pad_radius_m = number("pad_radius_m", Bound::Positive)?;
+                let surface =
+                    table.get("limit_surface").map(|value| value.choose("limit surface", &LIMIT_SURFACES));
+                let is_uncoupled = surface.transpose()? == Some("uncoupled");
+                SoftModelSpec::Coulomb { pad_radius_m, is_uncoupled }
+            }
         };
         Ok(Some(Self {
             model,
@@ -101,10 +109,12 @@ const ALLOWED: &str = "true, false, or a table such as { model = \"coulomb\", pa
 const MODELS: Vocabulary =
     Vocabulary { available: &["coulomb", "viscous", "stick-slip", "none"], later: &[] };
 const OF_NONE: Vocabulary = Vocabulary { available: &["model"], later: &[] };
+const LIMIT_SURFACES: Vocabulary = Vocabulary { available: &["ellipse", "uncoupled"], later: &[] };
 const OF_COULOMB: Vocabulary = Vocabulary {
     available: &[
         "model",
         "pad_radius_m",
+        "limit_surface",
         "stiffness_n_m_per_rad",
         "damping_n_m_s_per_rad",
         "normal_share",

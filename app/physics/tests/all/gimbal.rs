@@ -8,7 +8,7 @@ use std::f64::consts::PI;
 use common::*;
 use held::*;
 use nalgebra::{UnitQuaternion, Vector3};
-use physics::{SoftFinger, TorsionModel};
+use physics::{LimitSurface, SoftFinger, TorsionModel};
 
 /// Turns the gimbals of these fingers by 30 degrees about an axis in a second, and holds still for another; how far the
 /// cube has turned then (rotation vector, rad).
@@ -76,7 +76,8 @@ fn below_the_critical_area_the_object_does_not_follow() {
 fn a_gimbal_turns_no_more_than_torsional_friction_lets_it() {
     // The cube's centre 15 mm in front of the axis; pads that hold a tenth less than its weight turn it up to where
     // its weight is that.
-    let mut held = Held::new(SoftFinger::default(), 2000.0, 0.5, 0.015, 0.3);
+    let model = TorsionModel::Coulomb { pad_radius_m: 6e-3, limit_surface: LimitSurface::Uncoupled };
+    let mut held = Held::new(SoftFinger::default().with_model(model), 2000.0, 0.5, 0.015, 0.3);
     let limit = held.weight_moment() / (2.0 * 2.0 / 3.0 * 6e-3 * held.mu);
     let force = 0.9 * limit;
     held.squeeze_for(0.5, 1.5 * force);

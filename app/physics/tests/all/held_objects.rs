@@ -8,7 +8,7 @@ use std::f64::consts::PI;
 use common::*;
 use haptics::Cuboid;
 use nalgebra::{Isometry3, UnitQuaternion, Vector3};
-use physics::{Body, FingerSettings, MassProperties, Settings, SoftFinger, TorsionModel};
+use physics::{Body, FingerSettings, LimitSurface, MassProperties, Settings, SoftFinger, TorsionModel};
 
 const EDGE: f64 = 0.05;
 
@@ -230,7 +230,8 @@ fn soft_pads_brake_what_spins_between_them() {
     let disc = object(Cuboid::new(size).unwrap(), Isometry3::identity(), 2000.0, 0.8);
     let mass = MassProperties::of_shape(&disc.shape, 0.2).unwrap();
     let pad_radius_m = 5e-3;
-    let soft = SoftFinger::default().with_model(TorsionModel::Coulomb { pad_radius_m });
+    let soft = SoftFinger::default()
+        .with_model(TorsionModel::Coulomb { pad_radius_m, limit_surface: LimitSurface::Ellipse });
     let state = Body::at_rest(mass, &disc.X_WB).moving(Vector3::zeros(), Vector3::x() * 60.0);
     let settings = Settings { gravity_W: Vector3::zeros(), ..Settings::default() };
     let mut world = World::new(vec![disc], &[(0, state)], settings, 2)

@@ -99,7 +99,10 @@ fn held_at_a_corner_and_lowered_on_a_smooth_floor_a_cube_turns_until_it_lies_fla
 #[test]
 fn pads_that_hold_by_torsion_keep_it_from_turning() {
     // Of 20 mm: they hold m g 31 mm several times over.
-    let pads = SoftFinger::default().with_model(physics::TorsionModel::Coulomb { pad_radius_m: 0.02 });
+    let pads = SoftFinger::default().with_model(physics::TorsionModel::Coulomb {
+        pad_radius_m: 0.02,
+        limit_surface: physics::LimitSurface::Ellipse,
+    });
     let (angle, centre) = (-FRAC_PI_4 + 0.5, Vector3::new(0.0, 0.08, 0.0));
     let mut corner = Corner::new(angle, centre, pads);
     let high = Corner::hold(angle, centre);

@@ -36,17 +36,22 @@ impl World {
 
     /// One tick: the force on each finger, by its HIP.
     pub fn step(&mut self, hips: &[Vector3<f64>]) -> Vec<Vector3<f64>> {
+        self.step_in(hips, DT)
+    }
+
+    /// One tick of another length (s).
+    pub fn step_in(&mut self, hips: &[Vector3<f64>], dt_s: f64) -> Vec<Vector3<f64>> {
         self.touches.clear();
         let mut forces = Vec::new();
         for (index, (finger, hip)) in self.fingers.iter_mut().zip(hips).enumerate() {
             self.ticks[index].hip_W = *hip;
-            forces.push(finger.step(&self.entities, hip, DT).force_on_user_W);
+            forces.push(finger.step(&self.entities, hip, dt_s).force_on_user_W);
             for contact in finger.contacts() {
                 self.touches.push(Touch::of(contact, index));
             }
         }
         let rendered = self.touches.clone();
-        self.made = self.manipulation.step_with(&mut self.entities, &mut self.touches, &mut self.ticks, DT);
+        self.made = self.manipulation.step_with(&mut self.entities, &mut self.touches, &mut self.ticks, dt_s);
         for (touch, was) in self.touches.iter().zip(rendered) {
             forces[touch.finger] += touch.force_on_user_W - was.force_on_user_W;
         }
