@@ -67,10 +67,11 @@ pub(super) fn open(
     if has_switch(device, config) && !opened.extras().buttons {
         return Err(OpenError::NobodyPresses { device: device.name.clone() });
     }
-    // In lockstep the driver's idle ticks go by a clock that nobody can repeat.
+    // In lockstep the driver's idle ticks go by a clock that nobody can repeat. On a virtual clock there is none, and the first tick,
+    // in which nothing is written yet, shall be the same.
     let opened = match config.clock {
-        ClockMode::Lockstep => opened.waiting_for_a_commander(),
-        ClockMode::Real | ClockMode::Virtual => opened,
+        ClockMode::Lockstep | ClockMode::Virtual => opened.waiting_for_a_commander(),
+        ClockMode::Real => opened,
     };
     Ok(Box::new(opened))
 }

@@ -75,12 +75,15 @@ fn two_virtual_runs_write_the_same_bytes_and_another_seed_trembles_otherwise() {
 
 /// However long the driver waited for its commander before.
 #[test]
-fn two_lockstep_runs_write_the_same_bytes() {
+fn lockstep_runs_and_a_virtual_one_write_the_same_bytes() {
     let place = workplace(TABLE, &pressing());
-    for name in ["a.csv", "b.csv"] {
-        record(&place, "lockstep", name, &["--hand", "hand.csv", "--seconds", "1"]);
+    let all = [("a.csv", "lockstep"), ("b.csv", "lockstep"), ("c.csv", "virtual")];
+    for (name, clock) in all {
+        record(&place, clock, name, &["--hand", "hand.csv", "--seconds", "1"]);
     }
-    assert!(bytes(&place, "a.csv") == bytes(&place, "b.csv"));
+    for (name, clock) in all {
+        assert!(bytes(&place, "a.csv") == bytes(&place, name), "{clock}");
+    }
 }
 
 /// On every clock, the wall's force on a hand that rests is that of two springs in series, hand and wall, within what
