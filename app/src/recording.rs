@@ -7,12 +7,13 @@
 pub use crate::columns::Names;
 use crate::columns::{Cell, columns, each_cell};
 use crate::record::destination::{FormatError, STANDARD_OUTPUT, shown};
-use crate::record::{Opened, WholeLines};
+use crate::record::{ContentState, Opened, WholeLines};
 use crate::row::{BodyRow, Row};
 use io_driver::device::run_time_s;
 use std::fmt::Write as _;
 use std::io;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 use thiserror::Error;
 
 /// Why a recording could not be made, or not to its end.
@@ -163,6 +164,11 @@ impl Recording {
     /// No row has come, and the file has its earlier content.
     pub fn is_as_before(&self) -> bool {
         self.lines.is_as_before()
+    }
+
+    /// Whose content the file has, to be looked at from another thread.
+    pub(crate) fn content(&self) -> Arc<ContentState> {
+        self.lines.content()
     }
 
     /// Rows in the file.

@@ -10,6 +10,7 @@ use shm_abi::frame::{
     INPUT_DEAD_MAN_PRESENT, INPUT_EMERGENCY_STOP, LIMIT_HEAT, LIMIT_PEAK, LIMIT_SATURATION, LIMIT_SLEW,
     LIMIT_WORKSPACE,
 };
+use shm_abi::peer::ProcessWords;
 use shm_abi::segment::{ClockMode, DriverInfo};
 use shm_abi::{DriverState, DriverView, FaultReason, Frame};
 use std::borrow::Cow;
@@ -319,8 +320,11 @@ impl fmt::Display for Status {
         let cpu = self.cpu.map_or_else(|| "any CPU".into(), |cpu| format!("CPU {cpu}"));
         writeln!(
             f,
-            "driver      process {}, {} clock, {} Hz, {cpu}, {} wait",
-            self.driver_pid, self.clock, self.rate_hz, self.wait
+            "driver      {}, {} clock, {} Hz, {cpu}, {} wait",
+            ProcessWords(self.driver_pid),
+            self.clock,
+            self.rate_hz,
+            self.wait
         )?;
         let fault = self.fault.as_ref().map_or_else(String::new, |why| format!(": {why}"));
         write!(

@@ -383,7 +383,7 @@ fn allowed_in_words(group: Option<u32>, user: u32) -> String {
     match group {
         Some(group) => format!("members of group {}", group_in_words(group)),
         None if user == 0 => {
-            format!("{OWNERS}, in the driver's own user namespace (`nsenter --user --target PID` enters it),")
+            format!("{OWNERS}, by the numbers of the driver's own user namespace,")
         }
         None => OWNERS.into(),
     }

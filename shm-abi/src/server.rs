@@ -18,6 +18,7 @@
 //! [`FLOOD_REST`].
 
 mod connection;
+mod lapsed;
 mod places;
 mod sealer;
 
@@ -28,6 +29,7 @@ use crate::segment::{CommanderView, DriverMemory, LeaseOffer, SegmentError};
 use crate::socket_file::{Lock, SocketFile, make_sure_nobody_listens, without_end};
 use crate::{socket, users};
 use connection::{Connection, Heard, Offer, Stage, timespec};
+use lapsed::Lapsed;
 use places::Purpose;
 use rustix::event::{PollFd, PollFlags, poll};
 use rustix::io::Errno;
@@ -55,6 +57,8 @@ const BACKLOG: i32 = 64;
 const ACCEPT_REST: Duration = Duration::from_millis(100);
 /// How often it is looked whether a commander has mapped its segment.
 const OFFER_LOOK: Duration = Duration::from_millis(1);
+/// A commander that has not mapped its memory by then gives way to another user's: an honest one takes milliseconds.
+const MAPPED_WITHIN: Duration = Duration::from_millis(100);
 /// Time between two looks whether those who have left still hold what they were handed.
 const UNREAD_LOOK: Duration = Duration::from_millis(100);
 
@@ -143,6 +147,7 @@ pub struct Server {
     sealer: Sealer,
     connections: Vec<Connection>,
     next_lease: u64,
+    lapsed: Lapsed,
     accept_after: Option<Instant>,
     /// When the last two turns began, the older first (CLOCK_MONOTONIC, ns).
     turns_ns: [u64; 2],
@@ -189,6 +194,7 @@ impl Server {
             sealer,
             connections,
             next_lease: 1,
+            lapsed: Lapsed::default(),
             accept_after: None,
             turns_ns: [handshake::monotonic_ns(); 2],
         })
@@ -327,6 +333,9 @@ impl Server {
 
     fn hang_up(&mut self, index: usize, to: &mut impl Recipient) {
         let former = std::mem::replace(&mut self.connections[index].stage, Stage::Gone);
+        if matches!(former, Stage::Commanding { offer: Some(_), .. }) {
+            self.lapsed.note(self.connections[index].owner().user);
+        }
         // With an offer, the loop knows nothing of it yet.
         if let Stage::Commanding { lease, offer: None, .. } = former {
             // There is always room for this.
@@ -429,6 +438,7 @@ impl Server {
         to: &mut impl Recipient,
     ) -> Stage {
         self.end_lease_of_the_dead(to);
+        self.displace_idle_offer(index);
         if self.holder().is_some() {
             let _ = to.take(ServerEvent::LeaseRefused);
             return self.refuse(index, Verdict::LeaseHeld);
@@ -541,6 +551,22 @@ impl Server {
         }
     }
 
+    /// Takes a lease that is not in force back for this newcomer, from one who had time to map its memory, or whose user has let an
+    /// offer lapse shortly before; for an administrator at once.
+    fn displace_idle_offer(&mut self, newcomer: usize) {
+        let asks = self.connections[newcomer].owner().user;
+        let Some((holder, connection)) = self.holder() else { return };
+        let Stage::Commanding { offer: Some(offer), .. } = &connection.stage else { return };
+        let user = connection.owner().user;
+        let is_idle = offer.age() > MAPPED_WITHIN || self.lapsed.contains(&user);
+        let is_below =
+            self.check(newcomer, Right::Administer).is_ok() && self.check(holder, Right::Administer).is_err();
+        if user != asks && (is_idle || is_below) {
+            self.connections[holder].stage = Stage::Gone;
+            self.lapsed.note(user);
+        }
+    }
+
     fn answer(&self, index: usize, answer: &Answer, fds: &[BorrowedFd<'_>]) -> io::Result<()> {
         socket::send(self.connections[index].stream.as_fd(), answer, fds)
     }
@@ -565,6 +591,9 @@ impl Server {
                 _ => false,
             };
             if is_silent {
+                if matches!(connection.stage, Stage::Commanding { .. }) {
+                    self.lapsed.note(connection.owner().user);
+                }
                 connection.stage = Stage::Gone;
             }
         }
@@ -578,9 +607,68 @@ impl Server {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::doorbell::WaitMode;
+    use crate::segment::{ClockMode, DriverInfo};
+    use bytemuck::Zeroable;
+    use std::io::{Read, Write};
 
     /// One that belongs to no group of this process.
     const GROUP: u32 = 4242;
+
+    /// Sends a request as this user; the answer.
+    fn ask(server: &mut Server, memory: &DriverMemory, uid: u32, kind: RequestKind) -> (UnixStream, Verdict) {
+        let (mut far, near) = UnixStream::pair().unwrap();
+        near.set_nonblocking(true).unwrap();
+        let peer = Peer { uid, ..Peer::of(far.as_fd()).unwrap() };
+        server.connections.push(Connection::new(near, peer));
+        far.write_all(bytemuck::bytes_of(&Request::new(kind, "test"))).unwrap();
+        server.listen_to(server.connections.len() - 1, memory, &mut Vec::new());
+        server.forget_the_gone();
+        let mut answer = Answer::zeroed();
+        far.read_exact(bytemuck::bytes_of_mut(&mut answer)).unwrap();
+        (far, Verdict::from_word(answer.verdict).unwrap())
+    }
+
+    #[test]
+    #[cfg_attr(miri, ignore = "sockets are the system's")]
+    fn an_offer_that_nobody_takes_gives_way_to_other_users_and_at_once_to_administrators() {
+        let directory = tempfile::tempdir().unwrap();
+        let mut server = Server::bind(&directory.path().join("driver.sock")).unwrap();
+        let memory = DriverMemory::create(&DriverInfo {
+            period_ns: 1_000_000,
+            reply_budget_ns: 300_000,
+            max_command_age_ticks: 5,
+            ramp_in_ticks: 200,
+            ramp_out_ticks: 50,
+            is_commissioning: false,
+            clock_mode: ClockMode::Virtual,
+            wait_mode: WaitMode::Futex,
+            cpu: None,
+            devices: Vec::new(),
+            setup_report: String::new(),
+        });
+        let memory = memory.unwrap();
+        let owner = server.rights.owner;
+        let [one, other] = [owner + 1, owner + 2];
+        let command = |server: &mut Server, uid| ask(server, &memory, uid, RequestKind::Command);
+        let (_first, granted) = command(&mut server, one);
+        assert_eq!(granted, Verdict::Granted);
+        // He may still be about to map it.
+        assert_eq!(command(&mut server, other).1, Verdict::LeaseHeld);
+        let (_second, granted) = command(&mut server, owner);
+        assert_eq!(granted, Verdict::Granted, "an administrator");
+        assert_eq!(command(&mut server, one).1, Verdict::LeaseHeld);
+        std::thread::sleep(MAPPED_WITHIN + Duration::from_millis(20));
+        assert_eq!(command(&mut server, owner).1, Verdict::LeaseHeld, "it is his own");
+        let (_third, granted) = command(&mut server, one);
+        assert_eq!(granted, Verdict::Granted, "time enough");
+        // Who lets one lapse gives way at once for a while.
+        let (_fourth, granted) = command(&mut server, other);
+        assert_eq!(granted, Verdict::Granted);
+        assert_eq!(command(&mut server, one).1, Verdict::LeaseHeld);
+        server.lapsed.note(Some(other));
+        assert_eq!(command(&mut server, one).1, Verdict::Granted);
+    }
 
     #[test]
     #[cfg_attr(miri, ignore = "sockets are the system's")]

@@ -2,7 +2,7 @@
 
 use super::destination::{EventFormat, shown};
 use super::event_line::{KEYS, csv, json, said};
-use super::opened::Opened;
+use super::opened::{ContentState, Opened};
 use super::whole_lines::WholeLines;
 use crate::book::Book;
 use crate::columns::Names;
@@ -10,7 +10,8 @@ use crate::recording::RecordingError;
 use io_driver::device::run_time_s;
 use std::io;
 use std::path::PathBuf;
-use world::events::Event;
+use std::sync::Arc;
+use world::events::{Event, Kind};
 
 /// A file of events being written.
 pub struct EventsFile {
@@ -20,6 +21,8 @@ pub struct EventsFile {
     book: Book,
     period_ns: u64,
     is_table: bool,
+    /// Lines that tell of events that are missing.
+    losses: u64,
 }
 
 impl EventsFile {
@@ -33,7 +36,7 @@ impl EventsFile {
         let header = if is_table { KEYS.join(",") } else { String::new() };
         let lines = WholeLines::begin(file, &header)
             .map_err(|source| RecordingError::Create { file: path.clone(), source }.of_events())?;
-        Ok(Self { lines, path, names, book, period_ns, is_table })
+        Ok(Self { lines, path, names, book, period_ns, is_table, losses: 0 })
     }
 
     /// The run goes: a file without events is a result, too.
@@ -48,7 +51,12 @@ impl EventsFile {
 
     /// Events in the file.
     pub fn rows(&self) -> u64 {
-        self.lines.rows()
+        self.lines.rows().saturating_sub(self.losses)
+    }
+
+    /// Whose content the file has, to be looked at from another thread.
+    pub(super) fn content(&self) -> Arc<ContentState> {
+        self.lines.content()
     }
 
     /// Appends an event.
@@ -56,6 +64,7 @@ impl EventsFile {
     /// # Errors
     /// If it or what was before it cannot be written.
     pub fn event(&mut self, event: &Event) -> Result<(), RecordingError> {
+        self.losses += u64::from(matches!(event.kind, Kind::Lost { .. }));
         let mut said = said(event, &self.book);
         if let Some((_, names)) = said.1.take() {
             self.names = names;
@@ -78,7 +87,7 @@ impl EventsFile {
     /// If that fails, or nobody would find it.
     pub fn finish(mut self) -> Result<u64, RecordingError> {
         self.lines.keep().map_err(|source| self.failed(source))?;
-        let rows = self.lines.rows();
+        let rows = self.rows();
         if self.lines.is_removed() {
             Err(RecordingError::Removed { file: self.path, rows }.of_events())
         } else {

@@ -18,7 +18,7 @@ use super::about::{self, About};
 use super::destination::shown;
 use super::event_line::{holders, name, said};
 use super::foxglove;
-use super::opened::Opened;
+use super::opened::{ContentState, Opened};
 use super::schema::{self, event, order};
 use super::tick;
 use super::view::View;
@@ -61,6 +61,7 @@ pub(super) const ORDER_TOPIC: &str = "/orders";
 pub struct McapFile {
     writer: Writer<NoSeek<WholeWrites>>,
     beginning: Arc<Beginning>,
+    content: Arc<ContentState>,
     path: PathBuf,
     names: Names,
     period_ns: u64,
@@ -125,7 +126,7 @@ impl McapFile {
     ) -> Result<Self, RecordingError> {
         let path = file.path().to_owned();
         let failed = |error| RecordingError::Create { file: path.clone(), source: into_io(error) };
-        let may_wait = file.may_wait();
+        let (may_wait, content) = (file.may_wait(), file.content());
         let beginning = Arc::new(Beginning::default());
         let writes = WholeWrites::new(file, Arc::clone(&beginning));
         let mut writer = options().create(NoSeek::new(writes)).map_err(failed)?;
@@ -136,6 +137,7 @@ impl McapFile {
         let mut file = Self {
             writer,
             beginning,
+            content,
             path: path.clone(),
             names,
             period_ns,
@@ -180,6 +182,11 @@ impl McapFile {
     /// Rows in the file.
     pub(super) fn rows(&self) -> u64 {
         self.rows
+    }
+
+    /// Whose content the file has, to be looked at from another thread.
+    pub(super) fn content(&self) -> Arc<ContentState> {
+        Arc::clone(&self.content)
     }
 
     /// No row has come, and the file has its earlier content.

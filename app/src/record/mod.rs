@@ -31,6 +31,7 @@ pub use backpressure::Backpressure;
 pub use events_file::EventsFile;
 pub use files::Files;
 pub use mcap_file::McapFile;
+pub(crate) use opened::ContentState;
 pub use opened::{Opened, begin_all};
 pub use record_file::RecordFile;
 pub use recorder::{EventFeed, Recorded, Recorder};

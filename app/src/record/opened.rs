@@ -6,8 +6,8 @@
 //! whom they want write there. A file with content keeps it until its first piece with a row is written, for which room
 //! is reserved then ([`Opened::start`]); that its beginning alone will fit is found out before the run
 //! ([`Opened::reserve`]). The piece is written over the content, in whose room and the reserved one it lies: also on a disk
-//! that others fill meanwhile. File systems that copy what is written over (btrfs) reserve no room for that, and may refuse the
-//! piece itself: there it is tried beside the file first. The rest of the content is cut off behind the piece and not before;
+//! that others fill meanwhile. File systems that copy what is written over (btrfs) or that reserve nothing may refuse the piece
+//! itself: there the room for it, and for the content once more, is tried in a file without a name beside it first. The rest of the content is cut off behind the piece and not before;
 //! what was written over is put back if anything is refused. Until then the first byte is [`HALF_REPLACED`], so that nobody
 //! takes what a killed process leaves for one recording. Any other file begins at once.
 //! Invariant: what was opened and not started is as it was: a file that was made here is removed again.
@@ -24,6 +24,8 @@ use std::io::{self, Read, Seek, Write};
 use std::os::fd::{AsFd, AsRawFd};
 use std::os::unix::fs::{FileExt, FileTypeExt, MetadataExt};
 use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicU8, Ordering};
+use std::sync::{Arc, Mutex, PoisonError};
 use std::time::SystemTime;
 
 /// First byte of a file with a part of its earlier content behind a first piece: that of no recording.
@@ -38,9 +40,49 @@ pub struct Opened {
     file: File,
     path: PathBuf,
     before: Before,
-    /// Last change of the content before room was reserved behind it, if some was.
-    changed: Cell<Option<SystemTime>>,
+    /// Last change of the content before room was reserved behind it, if some was, and that by the reserving.
+    changed: Cell<Option<[SystemTime; 2]>>,
+    content: Arc<ContentState>,
 }
+
+/// Whose content a file has.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Content {
+    /// The earlier one.
+    Earlier,
+    /// Some of the earlier one, perhaps.
+    BeingReplaced,
+    /// Its own.
+    Replaced,
+    /// None.
+    Lost,
+}
+
+/// [`Content`], as several threads see it.
+#[derive(Debug)]
+pub(crate) struct ContentState(AtomicU8);
+
+impl ContentState {
+    const ALL: [Content; 4] = [Content::Earlier, Content::BeingReplaced, Content::Replaced, Content::Lost];
+
+    fn new(content: Content) -> Self {
+        Self(AtomicU8::new(content as u8))
+    }
+
+    fn store(&self, content: Content) {
+        self.0.store(content as u8, Ordering::Relaxed);
+    }
+
+    /// As it is now.
+    pub(crate) fn load(&self) -> Content {
+        Self::ALL[usize::from(self.0.load(Ordering::Relaxed)) % Self::ALL.len()]
+    }
+}
+
+/// Held while the content of a file is replaced.
+static ALONE: Mutex<()> = Mutex::new(());
+/// At least as large as what a file system takes for a byte.
+const BLOCK_BYTES: usize = 1 << 17;
 
 /// Former state of a file, which it has again with this value.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -106,7 +148,9 @@ impl Opened {
     }
 
     fn with(file: File, path: &Path, before: Before) -> Self {
-        Self { file, path: path.into(), before, changed: Cell::default() }
+        let content = if before == Before::Content { Content::Earlier } else { Content::Replaced };
+        let content = Arc::new(ContentState::new(content));
+        Self { file, path: path.into(), before, changed: Cell::default(), content }
     }
 
     /// As [`Self::open`], for a recording.
@@ -161,20 +205,23 @@ impl Opened {
         if limits::largest_file().is_some_and(|most| bytes > most) {
             return Err(Errno::FBIG.into());
         }
-        if self.changed.get().is_none() {
-            self.changed.set(Some(self.file.metadata()?.modified()?));
-        }
-        match fallocate(&self.file, FallocateFlags::KEEP_SIZE, 0, bytes) {
+        let modified = || self.file.metadata()?.modified();
+        let before = self.changed.get().map_or_else(modified, |[before, _]| Ok(before))?;
+        let reserved = fallocate(&self.file, FallocateFlags::KEEP_SIZE, 0, bytes);
+        self.changed.set(Some([before, modified()?]));
+        match reserved {
             Err(full @ (Errno::NOSPC | Errno::DQUOT | Errno::FBIG)) => Err(full.into()),
             // Of a file system that cannot answer.
             _ => Ok(()),
         }
     }
 
-    /// What was reserved behind the content, which was changed then, belongs to others again.
-    fn give_room_back(&self, changed: SystemTime) -> io::Result<()> {
-        self.file.set_len(self.file.metadata()?.len())?;
-        self.file.set_modified(changed)
+    /// What was reserved behind the content, which was changed then, belongs to others again. What others have changed since stays
+    /// changed; of a file of another user the time of the reserving stays.
+    fn give_room_back(&self, [before, reserved]: [SystemTime; 2]) -> io::Result<()> {
+        let found = self.file.metadata()?;
+        self.file.set_len(found.len())?;
+        if found.modified()? == reserved { self.file.set_modified(before) } else { Ok(()) }
     }
 
     /// Makes ready for a first piece of so many bytes, which is to be written at once, over the content if there is some.
@@ -194,66 +241,108 @@ impl Opened {
     /// # Errors
     /// Refusal by the system: the file has its content as before, or if even that is refused, nothing.
     pub(super) fn replace_content(&mut self, piece: &[u8]) -> io::Result<()> {
-        self.replace_and_cut(piece, || self.cut(piece.len() as u64))
-            .map(|()| self.before = Before::Stays)
-            .or_else(|NotReplaced { why, is_as_before }| {
-                if !is_as_before {
-                    self.before = Before::Stays;
-                    self.cut(0)?;
-                }
+        match self.replace_and_cut(piece, || self.cut(piece.len() as u64)) {
+            Ok(()) => {
+                self.before = Before::Stays;
+                self.content.store(Content::Replaced);
+                Ok(())
+            }
+            Err(NotReplaced { why, is_as_before: true }) => {
+                self.content.store(Content::Earlier);
                 Err(why)
-            })
+            }
+            Err(NotReplaced { why, is_as_before: false }) => {
+                self.before = Before::Stays;
+                self.content.store(Content::Lost);
+                self.cut(0)?;
+                Err(io::Error::new(why.kind(), format!("{why}; its earlier content is lost")))
+            }
+        }
+    }
+
+    /// Whose content it has, to be looked at from another thread.
+    pub(super) fn content(&self) -> Arc<ContentState> {
+        Arc::clone(&self.content)
     }
 
     /// Writes the piece over the content, has the rest cut off, and puts the first byte.
     fn replace_and_cut(&self, piece: &[u8], cut: impl FnOnce() -> io::Result<()>) -> Result<(), NotReplaced> {
         let as_before = |why| NotReplaced { why, is_as_before: true };
         let length = self.file.metadata().map_err(as_before)?.len();
-        self.try_beside(piece).map_err(as_before)?;
         let replaced = self.contents_first(piece.len());
+        // Else others of this process take the room that is found.
+        let _alone = ALONE.lock().unwrap_or_else(PoisonError::into_inner);
+        self.try_room(piece, replaced.as_deref().unwrap_or_default()).map_err(as_before)?;
         let Some((first, rest)) = piece.split_first() else { return cut().map_err(as_before) };
+        self.content.store(Content::BeingReplaced);
         let written = (&self.file).write_all(&[HALF_REPLACED]).and_then(|()| (&self.file).write_all(rest));
-        written.and_then(|()| cut()).map_err(|why| {
+        if let Err(why) = written.and_then(|()| cut()) {
             let back = replaced.and_then(|replaced| self.put_back(&replaced, length));
-            NotReplaced { why, is_as_before: back.is_ok() }
-        })?;
-        let whole = self.file.write_all_at(&[*first], 0);
-        whole.map_err(|why| NotReplaced { why, is_as_before: false })
+            return Err(NotReplaced { why, is_as_before: back.is_ok() });
+        }
+        self.file.write_all_at(&[*first], 0).map_err(|why| {
+            // Of a longer one the rest is gone.
+            let all = replaced.ok().filter(|replaced| replaced.len() as u64 == length);
+            let is_as_before = all.is_some_and(|replaced| self.put_back(&replaced, length).is_ok());
+            NotReplaced { why, is_as_before }
+        })
     }
 
-    /// Writes of what was replaced as much as was written over, and cuts off what is behind the earlier content.
+    /// Writes of what was replaced as much as was written over, cuts off what is behind the earlier content, and puts the first
+    /// byte: until then the file is no recording.
     fn put_back(&self, replaced: &[u8], length: u64) -> io::Result<()> {
         let reached = (&self.file).stream_position()?;
         // What nobody has written over is not written again: that might be refused where this is not.
         let reached = replaced.len().min(usize::try_from(reached).unwrap_or(usize::MAX));
-        (&self.file).rewind()?;
-        (&self.file).write_all(&replaced[..reached])?;
-        (&self.file).rewind()?;
-        self.cut(length)
+        let Some((first, rest)) = replaced[..reached].split_first() else { return Ok(()) };
+        self.file.write_all_at(rest, 1)?;
+        self.cut(length)?;
+        self.file.write_all_at(&[*first], 0)?;
+        (&self.file).rewind()
     }
 
-    /// Writes a piece into a file without a name beside this one, and gives it up again, on file systems that copy what is written
-    /// over: it takes the same room there as the piece over the content will, and its first byte once more, and costs nothing if
-    /// there is none.
-    fn try_beside(&self, piece: &[u8]) -> io::Result<()> {
-        const BTRFS: i64 = 0x9123_683e;
-        const BCACHEFS: i64 = 0xca45_1a4e;
-        const ZFS: i64 = 0x2fc1_2fc1;
-        /// At least as large as what a file system takes for a byte.
-        const BLOCK_BYTES: usize = 1 << 17;
-        // A file system that does not say what it is is taken for a common one.
-        let kind = rustix::fs::fstatfs(&self.file).map_or(0, |found| found.f_type);
-        if ![BTRFS, BCACHEFS, ZFS].contains(&kind) {
+    /// Finds out whether a piece can be written over the content, and that back, where room that is reserved is no promise: on file
+    /// systems that copy what is written over, or that reserve none.
+    fn try_room(&self, piece: &[u8], replaced: &[u8]) -> io::Result<()> {
+        if self.keeps_reserved_room() {
             return Ok(());
         }
-        let own = std::fs::read_link(format!("/proc/self/fd/{}", self.file.as_raw_fd()))?;
-        let Some(directory) = own.parent() else { return Ok(()) };
-        let nameless = rustix::fs::open(directory, OFlags::TMPFILE | OFlags::WRONLY, Mode::RUSR | Mode::WUSR);
-        // Where nobody may make a file the piece over the content tells.
-        let Ok(trial) = nameless else { return Ok(()) };
-        let mut trial = File::from(trial);
-        trial.write_all(piece)?;
-        trial.write_all(&[0; BLOCK_BYTES])
+        // What a file system takes for the first byte alone, which is written once more.
+        let block = vec![HALF_REPLACED; BLOCK_BYTES];
+        if let Some(mut trial) = self.nameless_beside() {
+            return [piece, replaced, &block].into_iter().try_for_each(|part| trial.write_all(part));
+        }
+        // Where nobody may make a file, or it would be elsewhere: behind the content, which it ends like a copy that broke off.
+        let length = self.file.metadata()?.len();
+        let mut at = length;
+        let tried = [block.as_slice(), piece, replaced].into_iter().try_for_each(|part| {
+            // No line of it.
+            let noise: Vec<u8> = part.iter().map(|byte| byte | 0x80).collect();
+            self.file.write_all_at(&noise, at)?;
+            at += part.len() as u64;
+            Ok(())
+        });
+        self.cut(length).and(tried)
+    }
+
+    /// Writing over its content needs no room, and room that was reserved is there.
+    fn keeps_reserved_room(&self) -> bool {
+        const EXT: i64 = 0xef53;
+        const XFS: i64 = 0x5846_5342;
+        const TMPFS: i64 = 0x0102_1994;
+        let kind = rustix::fs::fstatfs(&self.file).map_or(0, |found| found.f_type);
+        // A byte that is there: none is reserved, but it tells whether any could be.
+        [EXT, XFS, TMPFS].contains(&kind) && fallocate(&self.file, FallocateFlags::KEEP_SIZE, 0, 1).is_ok()
+    }
+
+    /// A file without a name on the same file system, in the same directory.
+    fn nameless_beside(&self) -> Option<File> {
+        let own = std::fs::read_link(format!("/proc/self/fd/{}", self.file.as_raw_fd())).ok()?;
+        let flags = OFlags::TMPFILE | OFlags::WRONLY;
+        let nameless = rustix::fs::open(own.parent()?, flags, Mode::RUSR | Mode::WUSR).ok()?;
+        let nameless = File::from(nameless);
+        let device = |file: &File| Some(file.metadata().ok()?.dev());
+        (device(&nameless) == device(&self.file)).then_some(nameless)
     }
 
     /// So many bytes of the content, or all of it if that is less.

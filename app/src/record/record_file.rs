@@ -4,8 +4,10 @@
 
 use super::events_file::EventsFile;
 use super::mcap_file::McapFile;
+use super::opened::ContentState;
 use crate::recording::{Recording, RecordingError};
 use crate::row::{BodyRow, Row};
+use std::sync::Arc;
 use world::events::Event;
 
 /// A recording in one of its formats.
@@ -34,6 +36,15 @@ impl RecordFile {
             Self::Csv(file) => file.is_as_before(),
             Self::Mcap(file) => file.is_as_before(),
             Self::Events(file) => file.is_as_before(),
+        }
+    }
+
+    /// Whose content the file has, to be looked at from another thread.
+    pub(super) fn content(&self) -> Arc<ContentState> {
+        match self {
+            Self::Csv(file) => file.content(),
+            Self::Mcap(file) => file.content(),
+            Self::Events(file) => file.content(),
         }
     }
 

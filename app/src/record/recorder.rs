@@ -10,6 +10,7 @@
 
 use super::backpressure::{Backpressure, Progress, Wait};
 use super::destination::shown;
+use super::opened::{Content, ContentState};
 use super::record_file::RecordFile;
 use crate::fast_loop::WhenFull;
 use crate::progress::{SOON, StatusLine};
@@ -79,8 +80,9 @@ pub struct EventFeed {
 }
 
 impl Subscriber for EventFeed {
+    /// One that was given up still counts what it loses.
     fn is_over(&self) -> bool {
-        self.shared.is_closing.load(Ordering::Relaxed) || self.shared.progress.is_given_up()
+        self.shared.is_closing.load(Ordering::Relaxed)
     }
 
     fn event(&mut self, event: &Event) {
@@ -119,6 +121,7 @@ pub struct Recorder {
     /// Why it was given up, which has been told.
     given_up: Option<String>,
     shared: Arc<Shared>,
+    content: Arc<ContentState>,
     thread: JoinHandle<Result<u64, RecordingError>>,
 }
 
@@ -159,6 +162,7 @@ impl Recorder {
         let places = MOST_BODIES.checked_div(bodies).map_or(ROW_QUEUE, |places| places.clamp(64, ROW_QUEUE));
         let (rows, receiver) = row_queue_of(places, bodies);
         let shared = Arc::new(Shared::default());
+        let content = file.content();
         let unit = if matches!(file, RecordFile::Events(_)) { EVENTS } else { "rows" };
         let (events, event_ends) = event_queue(MOST_EVENTS);
         let writer =
@@ -190,6 +194,7 @@ impl Recorder {
             untold: 0,
             given_up: None,
             shared,
+            content,
             thread,
         })
     }
@@ -273,16 +278,28 @@ impl Recorder {
         let is_given_up = self.shared.progress.is_given_up();
         if is_given_up && self.given_up.is_none() {
             let why = format!(
-                "cannot write the recording {}: nothing was written for {} s; the run goes on without it; what it has ends \
-                 at t = {:?} s at the latest",
+                "cannot write the recording {}: nothing was written for {} s; the run goes on without it; {}",
                 shown(&self.path).display(),
                 self.backpressure.patience().as_secs(),
-                run_time_s(self.last_tick.cast_signed(), self.period_ns)
+                self.has_until_now()
             );
             say(format_args!("phantom3: {why}"));
             self.given_up = Some(why);
         }
         is_given_up
+    }
+
+    /// Content of the file in words, while its thread is stuck.
+    fn has_until_now(&self) -> String {
+        match self.content.load() {
+            Content::Earlier => "so far the file is as it was".into(),
+            Content::BeingReplaced => "its earlier content may be lost".into(),
+            Content::Lost => "its earlier content is lost".into(),
+            Content::Replaced => {
+                let until_s = run_time_s(self.last_tick.cast_signed(), self.period_ns);
+                format!("what it has ends at t = {until_s:?} s at the latest")
+            }
+        }
     }
 
     /// Rows are missing in front of this tick.
@@ -383,11 +400,13 @@ impl Recorder {
     /// The thread ends with the process.
     fn leave_behind(self) -> Recorded {
         let (sent, lost) = self.sent_and_lost();
-        let why = self.given_up.unwrap_or_else(|| {
+        let is_as_before = self.content.load() == Content::Earlier;
+        let why = self.given_up.clone().unwrap_or_else(|| {
             let why = format!(
-                "cannot finish the recording {}: nothing was written for {} s; what reached it until now is readable",
+                "cannot finish the recording {}: nothing was written for {} s; {}",
                 shown(&self.path).display(),
-                self.backpressure.patience().as_secs()
+                self.backpressure.patience().as_secs(),
+                self.has_until_now()
             );
             say(format_args!("phantom3: {why}"));
             why
@@ -400,7 +419,7 @@ impl Recorder {
             lost: lost + sent.saturating_sub(rows),
             is_left_behind: true,
             failure: Some(why),
-            is_as_before: false,
+            is_as_before,
         }
     }
 }

@@ -6,9 +6,10 @@
 //! Invariants: whatever goes wrong, a file ends with a complete line: a write that failed half way (a full disk) is cut
 //! back to the last line that fits. Only lines that are in the file count.
 
-use super::opened::Opened;
+use super::opened::{ContentState, Opened};
 use rt_core::output_file;
 use std::io::{self, Seek, SeekFrom, Write};
+use std::sync::Arc;
 
 /// Written at once when this much has come together.
 const CHUNK_BYTES: usize = 256 * 1024;
@@ -113,6 +114,11 @@ impl WholeLines {
         self.buffer.clear();
         self.ends.clear();
         written
+    }
+
+    /// Whose content it has, to be looked at from another thread.
+    pub(crate) fn content(&self) -> Arc<ContentState> {
+        self.file.content()
     }
 
     /// It has what it had before, and nothing of what is gathered.

@@ -61,6 +61,11 @@ impl LeaseOffer {
             || (!self.tells && self.made.elapsed() >= MAPPED_WITHIN)
     }
 
+    /// Time since it was made.
+    pub fn age(&self) -> Duration {
+        self.made.elapsed()
+    }
+
     /// Whether the commander had time enough to map it.
     pub fn is_overdue(&self) -> bool {
         self.tells && self.made.elapsed() > TAKEN_WITHIN

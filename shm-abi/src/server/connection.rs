@@ -62,6 +62,14 @@ impl Offer {
         }
     }
 
+    /// Time since it was made, or since its memory was mapped.
+    pub(super) fn age(&self) -> Duration {
+        match self {
+            Self::Made(offer) => offer.age(),
+            Self::Sealing { since } => since.elapsed(),
+        }
+    }
+
     /// True if it had time enough.
     pub(super) fn is_overdue(&self) -> bool {
         match self {

@@ -8,6 +8,7 @@
 //! for administrators, however many others there are. Users that this process cannot tell apart count as one. Those
 //! who have yet to say what they want have places of their own; a newcomer that finds them taken gets the place of the
 //! oldest silent connection of whoever has the most, so that opening more of them costs nobody but the opener.
+//! Limit: whoever has a range of users of his own (`/etc/subuid`) can take all places but those of administrators.
 
 /// Connections at once: observers, commanders of once, the commander, those who have yet to ask.
 pub const MAX_CONNECTIONS: usize = OBSERVERS.all + COMMANDERS.all + 1 + MAX_ASKING;
