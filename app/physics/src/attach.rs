@@ -204,6 +204,7 @@ impl Bond {
             force_W: self.force_W,
             torsion: Torsion::default(),
             rolling: Rolling::default(),
+            turning_m: [0.0; 2],
             tie_n: Some(most_n),
         }
     }

@@ -141,7 +141,7 @@ impl Pair {
         let begins = self.count == 0;
         self.carry(&found, poses, reach_m, speed_m_s * start.dt_s, last);
         let pressed = self.anchors[..self.count].iter().filter(|anchor| anchor.is_pressed()).count();
-        let resists_turning = pressed <= turning::MOST_POINTS;
+        let resists_turning = (1..=turning::MOST_POINTS).contains(&pressed);
         if !resists_turning {
             self.anchors[..self.count].iter_mut().for_each(|anchor| anchor.turn_back(0.0));
         }

@@ -59,6 +59,7 @@ impl Restitution {
         (gravity_W, dt_s): (&Vector3<f64>, f64),
     ) -> Solved {
         let Self { meetings, impacts, stops, bounce, cascade } = self;
+        solver.expect(&(gravity_W * dt_s));
         cascade.begin();
         impacts.clear();
         stops.clear();

@@ -37,6 +37,8 @@ pub struct Row {
     pub torsion: Torsion,
     /// Its resistance to rolling.
     pub rolling: Rolling,
+    /// Torques that torsion and rolling hold per normal force, beside their own limits \[m\].
+    pub turning_m: [f64; 2],
     /// A tie, not a contact: it pulls as well as it presses, in every direction up to this force \[N\]; there is no cone.
     pub tie_n: Option<f64>,
 }
@@ -50,7 +52,7 @@ pub struct Torsion {
     pub stiffness_nm_per_rad: f64,
     /// \[N m s/rad\]
     pub damping_nm_s_per_rad: f64,
-    /// The torque stays within this \[N m\]; 0: none.
+    /// The torque stays within this, whatever presses \[N m\].
     pub most_nm: f64,
     /// At first a guess, then the answer \[N m\].
     pub torque_nm: f64,
@@ -63,17 +65,10 @@ impl Torsion {
         self.stiffness_nm_per_rad * dt_s + self.damping_nm_s_per_rad
     }
 
-    /// Makes the guess one that it can have.
-    #[inline]
-    pub(crate) fn begin(&mut self) {
-        let guess_nm = if self.torque_nm.is_finite() { self.torque_nm } else { 0.0 };
-        self.torque_nm = guess_nm.clamp(-self.most_nm, self.most_nm);
-    }
-
     /// The torque if the body turns about the normal at `spin_rad_s` all the tick \[N m\].
     #[inline]
-    pub(crate) fn at_end_nm(&self, spin_rad_s: f64, dt_s: f64) -> f64 {
-        (self.rest_nm - self.falls(dt_s) * spin_rad_s).clamp(-self.most_nm, self.most_nm)
+    pub(crate) fn at_end_nm(&self, spin_rad_s: f64, dt_s: f64, most_nm: f64) -> f64 {
+        (self.rest_nm - self.falls(dt_s) * spin_rad_s).clamp(-most_nm, most_nm)
     }
 
     /// The torque after a turn about the normal (rad), while it turns so fast \[N m\].
@@ -85,17 +80,17 @@ impl Torsion {
 
     /// By how much that torque falls per angular velocity, where it stands \[N m s\].
     #[inline]
-    pub(crate) fn falls_at_end(&self, spin_rad_s: f64, dt_s: f64) -> f64 {
+    pub(crate) fn falls_at_end(&self, spin_rad_s: f64, dt_s: f64, most_nm: f64) -> f64 {
         let falls = self.falls(dt_s);
-        if (self.rest_nm - falls * spin_rad_s).abs() < self.most_nm { falls } else { 0.0 }
+        if (self.rest_nm - falls * spin_rad_s).abs() < most_nm { falls } else { 0.0 }
     }
 
     /// The slope of the line to where the torque stands from where there is none \[N m s\]: what a torque at its limit, which
     /// does not change at all, is worth on the way back.
     #[inline]
-    pub(crate) fn chord(&self, spin_rad_s: f64, dt_s: f64) -> f64 {
+    pub(crate) fn chord(&self, spin_rad_s: f64, dt_s: f64, most_nm: f64) -> f64 {
         let (falls, trial_nm) = (self.falls(dt_s), self.rest_nm - self.falls(dt_s) * spin_rad_s);
-        if trial_nm.abs() <= self.most_nm { falls } else { falls * (self.most_nm / trial_nm.abs()) }
+        if trial_nm.abs() <= most_nm { falls } else { falls * (most_nm / trial_nm.abs()) }
     }
 }
 
@@ -108,7 +103,7 @@ pub struct Rolling {
     pub stiffness_nm_per_rad: f64,
     /// \[N m s/rad\]
     pub damping_nm_s_per_rad: f64,
-    /// The torque is no larger \[N m\]; 0: none.
+    /// The torque is no larger, whatever presses \[N m\].
     pub most_nm: f64,
     /// At first a guess, then the answer \[N m\].
     pub torque_W: Vector3<f64>,
@@ -121,16 +116,10 @@ impl Rolling {
         self.stiffness_nm_per_rad * dt_s + self.damping_nm_s_per_rad
     }
 
-    /// Makes the guess one that it can have.
-    #[inline]
-    pub(crate) fn begin(&mut self) {
-        self.torque_W = within_ball(&self.torque_W, self.most_nm);
-    }
-
     /// The torque if the body turns at `across_W` (rad/s), across the normal, all the tick \[N m\].
     #[inline]
-    pub(crate) fn at_end_W(&self, across_W: &Vector3<f64>, dt_s: f64) -> Vector3<f64> {
-        within_ball(&(self.rest_W - across_W * self.falls(dt_s)), self.most_nm)
+    pub(crate) fn at_end_W(&self, across_W: &Vector3<f64>, dt_s: f64, most_nm: f64) -> Vector3<f64> {
+        within_ball(&(self.rest_W - across_W * self.falls(dt_s)), most_nm)
     }
 
     /// By how much that torque falls per angular velocity, where it stands \[N m s\]; `normal_W` is the contact's.
@@ -140,16 +129,17 @@ impl Rolling {
         normal_W: &Vector3<f64>,
         across_W: &Vector3<f64>,
         dt_s: f64,
+        most_nm: f64,
     ) -> Matrix3<f64> {
         let plane = Matrix3::identity() - normal_W * normal_W.transpose();
         let falls = self.falls(dt_s);
         let trial_W = self.rest_W - across_W * falls;
         let trial_nm = trial_W.norm();
-        if trial_nm <= self.most_nm {
+        if trial_nm <= most_nm {
             return plane * falls;
         }
         let t = trial_W / trial_nm;
-        (plane - t * t.transpose()) * (falls * self.most_nm / trial_nm)
+        (plane - t * t.transpose()) * (falls * most_nm / trial_nm)
     }
 }
 
@@ -192,6 +182,7 @@ impl Row {
             force_W: Vector3::zeros(),
             torsion,
             rolling: Rolling::default(),
+            turning_m: [0.0; 2],
             tie_n: None,
         }
     }
@@ -251,6 +242,8 @@ impl Row {
             rolling.stiffness_nm_per_rad,
             rolling.damping_nm_s_per_rad,
             rolling.most_nm,
+            self.turning_m[0],
+            self.turning_m[1],
         ];
         vectors.iter().all(|v| v.iter().all(|x| x.is_finite()))
             && not_negative.iter().all(|x| x.is_finite() && *x >= 0.0)
@@ -321,26 +314,126 @@ impl Row {
     }
 }
 
-/// With friction that holds a given force, whatever presses: the slopes of a convex function of the velocity.
+/// Torques beside that of the force: what torsion and rolling hold grows with what presses.
 impl Row {
-    /// The most that friction holds if the force is this (N).
-    pub(crate) fn holds_n(&self, force_W: &Vector3<f64>) -> f64 {
-        self.mu() * self.normal_W.dot(force_W).max(0.0)
+    /// True of a row that may have any.
+    #[inline]
+    pub(crate) fn has_torque(&self) -> bool {
+        self.torsion.most_nm.max(self.rolling.most_nm) > 0.0 || self.turning_m[0].max(self.turning_m[1]) > 0.0
     }
 
-    /// As [`Self::at_end_W`].
-    pub(crate) fn at_end_within_W(&self, velocity_W: &Vector3<f64>, dt_s: f64, most_n: f64) -> Vector3<f64> {
+    /// Force along the normal if that is the trial force, or none \[N\].
+    #[inline]
+    pub(crate) fn presses_n(&self, trial_W: &Vector3<f64>) -> f64 {
+        self.normal_W.dot(trial_W).max(0.0)
+    }
+
+    /// Limits of torsion and rolling where so much presses (N) \[N m\].
+    #[inline]
+    pub(crate) fn most_turning_nm(&self, presses_n: f64) -> [f64; 2] {
+        let [about_m, across_m] = self.turning_m;
+        [self.torsion.most_nm + about_m * presses_n, self.rolling.most_nm + across_m * presses_n]
+    }
+
+    /// Makes the guesses of its torques such as it can have with its force.
+    #[inline]
+    pub(crate) fn begin_torque(&mut self) {
+        let [most_nm, most_across_nm] = self.most_turning_nm(self.presses_n(&self.force_W));
+        let guess_nm = if self.torsion.torque_nm.is_finite() { self.torsion.torque_nm } else { 0.0 };
+        self.torsion.torque_nm = guess_nm.clamp(-most_nm, most_nm);
+        self.rolling.torque_W = within_ball(&self.rolling.torque_W, most_across_nm);
+    }
+
+    /// Torques about the normal and across it if the body turns like that all the tick (rad/s) while
+    /// so much presses (N).
+    #[inline]
+    pub(crate) fn turning_at_end(
+        &self,
+        spin_W: &Vector3<f64>,
+        dt_s: f64,
+        presses_n: f64,
+    ) -> (f64, Vector3<f64>) {
+        let [most_nm, most_across_nm] = self.most_turning_nm(presses_n);
+        let spin_rad_s = self.normal_W.dot(spin_W);
+        let across_W = spin_W - self.normal_W * spin_rad_s;
+        let torque_nm = self.torsion.at_end_nm(spin_rad_s, dt_s, most_nm);
+        (torque_nm, self.rolling.at_end_W(&across_W, dt_s, most_across_nm))
+    }
+
+    /// Fall of these per spin, where they stand \[N m s\]; of torsion the chords, if wanted.
+    #[inline]
+    pub(crate) fn turning_falls_W(
+        &self,
+        spin_W: &Vector3<f64>,
+        dt_s: f64,
+        presses_n: f64,
+        chords: bool,
+    ) -> Matrix3<f64> {
+        let [most_nm, most_across_nm] = self.most_turning_nm(presses_n);
+        let n = &self.normal_W;
+        let spin_rad_s = n.dot(spin_W);
+        let twists = match chords {
+            true => self.torsion.chord(spin_rad_s, dt_s, most_nm),
+            false => self.torsion.falls_at_end(spin_rad_s, dt_s, most_nm),
+        };
+        let across_W = spin_W - n * spin_rad_s;
+        n * n.transpose() * twists + self.rolling.falls_at_end_W(n, &across_W, dt_s, most_across_nm)
+    }
+
+    /// Fall of these per velocity of the point, which takes from what presses (N) \[N s\].
+    #[inline]
+    pub(crate) fn turning_falls_by_velocity_W(
+        &self,
+        spin_W: &Vector3<f64>,
+        dt_s: f64,
+        presses_n: f64,
+    ) -> Matrix3<f64> {
+        if presses_n <= 0.0 {
+            return Matrix3::zeros();
+        }
+        let [most_nm, most_across_nm] = self.most_turning_nm(presses_n);
+        let n = &self.normal_W;
+        let (torque_nm, torque_W) = self.turning_at_end(spin_W, dt_s, presses_n);
+        let mut grows_W = Vector3::zeros();
+        if torque_nm.abs() >= most_nm {
+            grows_W += n * self.turning_m[0].copysign(torque_nm);
+        }
+        let across_nm = torque_W.norm();
+        if across_nm > 0.0 && across_nm >= most_across_nm * (1.0 - LIMIT) {
+            grows_W += torque_W * (self.turning_m[1] / across_nm);
+        }
+        grows_W * n.transpose() * self.falls(dt_s)[0]
+    }
+}
+
+/// Roundings of a length.
+const LIMIT: f64 = 1e-14;
+
+/// With friction that holds a given force, whatever presses: the slopes of a convex function of the velocity.
+impl Row {
+    /// As [`Self::at_end_W`], if friction holds what it does where so much presses (N).
+    pub(crate) fn at_end_within_W(
+        &self,
+        velocity_W: &Vector3<f64>,
+        dt_s: f64,
+        presses_n: f64,
+    ) -> Vector3<f64> {
         let trial_W = self.trial_at_end_W(velocity_W, dt_s);
         if self.tie_n.is_some() {
             return self.project(&trial_W);
         }
         let normal_n = self.normal_W.dot(&trial_W);
         let across_W = trial_W - self.normal_W * normal_n;
-        self.normal_W * normal_n.max(0.0) + within_ball(&across_W, most_n)
+        self.normal_W * normal_n.max(0.0) + within_ball(&across_W, self.mu() * presses_n)
     }
 
     /// As [`Self::falls_at_end_W`].
-    pub(crate) fn falls_within_W(&self, velocity_W: &Vector3<f64>, dt_s: f64, most_n: f64) -> Matrix3<f64> {
+    pub(crate) fn falls_within_W(
+        &self,
+        velocity_W: &Vector3<f64>,
+        dt_s: f64,
+        presses_n: f64,
+    ) -> Matrix3<f64> {
         if self.tie_n.is_some() {
             return self.falls_at_end_W(velocity_W, dt_s);
         }
@@ -349,7 +442,7 @@ impl Row {
         let trial_W = self.trial_at_end_W(velocity_W, dt_s);
         let normal_n = n.dot(&trial_W);
         let across_W = trial_W - n * normal_n;
-        let across_n = across_W.norm();
+        let (across_n, most_n) = (across_W.norm(), self.mu() * presses_n);
         let pressed = if normal_n > 0.0 { n * n.transpose() * along } else { Matrix3::zeros() };
         let plane = Matrix3::identity() - n * n.transpose();
         if across_n <= most_n {

@@ -8,7 +8,7 @@
 //! that all forces of the tick leave its point with. Bodies that press each other are an island ([`island`]): six unknowns a
 //! body, whatever the number of its contact points, and they are found together by Newton's method ([`newton`]). Islands of more
 //! than [`blocks::MAX_BODIES`], or that are more entangled than a tick has time for, are found body by body in turns ([`together`]).
-//! Warm: all begin with the forces of the last tick.
+//! Warm: all begin with the forces of the last tick, or with its velocities if these are nearer.
 //!
 //! Invariant: velocities and forces belong together to rounding, however many turns were made: what the bodies got is the
 //! sum of the rows' forces. Where stiction breaks, that row slides for the rest of the tick. Rows that are not made of
@@ -25,6 +25,8 @@ mod newton;
 mod relax;
 mod six;
 mod together;
+
+use nalgebra::Vector3;
 
 use crate::row::{Held, Row};
 pub use island::Islands;
@@ -86,6 +88,12 @@ impl Solver {
             newton: Newton::with_capacity(rows, bodies),
             together: together::Room::with_capacity(rows),
         }
+    }
+
+    /// Tells what velocity gravity has given to all bodies in the tick to come \[m/s\]: what rests,
+    /// or goes on as it did, is found sooner.
+    pub(crate) fn expect(&mut self, fall_W: &Vector3<f64>) {
+        self.newton.fall_W = *fall_W;
     }
 
     /// The islands of the last tick that was solved.

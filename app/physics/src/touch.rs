@@ -91,6 +91,7 @@ impl Touch {
             force_W,
             torsion: Torsion::default(),
             rolling: Rolling::default(),
+            turning_m: [0.0; 2],
             tie_n: None,
         };
         let velocity_W = motion.at(&arm_W);

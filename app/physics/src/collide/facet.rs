@@ -180,6 +180,12 @@ impl Plate {
         self.centre + self.u * s + self.v * t
     }
 
+    /// The direction in which the edge of this number looks, along the plate.
+    pub(super) fn side(&self, edge: usize) -> Vector3<f64> {
+        let way = [self.v, -self.u, -self.v, self.u][edge];
+        way / way.norm()
+    }
+
     /// The point at an angle of the rim.
     pub(super) fn at_angle(&self, angle: f64) -> Vector3<f64> {
         let (sine, cosine) = angle.sin_cos();

@@ -63,6 +63,11 @@ impl Patches {
         self.all[1..].iter().any(|patch| patch.is_known)
     }
 
+    /// Whether any place is pressed.
+    pub(super) fn are_pressed(&self) -> bool {
+        self.all.iter().any(Patch::is_pressed)
+    }
+
     /// Whether another place is pressed.
     pub(super) fn others_press(&self, number: usize) -> bool {
         self.all.iter().enumerate().any(|(at, patch)| at != number && patch.is_pressed())

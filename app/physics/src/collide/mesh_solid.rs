@@ -48,6 +48,25 @@ pub(super) fn contact_points(
         }
         return;
     }
+    let was_pressed = patches.are_pressed();
+    let mut found = find(mesh, other, [reach_m, travel_m], patches);
+    if was_pressed && !patches.are_pressed() {
+        // The plane of the last tick's points shows them no more: as if there had been none.
+        let mut anew = *patches;
+        if meet(mesh, other, reach_m, &mut anew) {
+            let found_anew = find(mesh, other, [reach_m, travel_m], &mut anew);
+            if anew.are_pressed() {
+                (found, *patches) = (found_anew, anew);
+            }
+        }
+    }
+    found.all().iter().for_each(|contact| told.tell(contact));
+    patches.all.iter_mut().enumerate().for_each(|(number, patch)| patch.carried = found.carried(number));
+    patches.put_a_pressed_one_first();
+}
+
+/// All contacts, of each place by its plane.
+fn find(mesh: &Mesh, other: &Other<'_>, [reach_m, travel_m]: [f64; 2], patches: &mut Patches) -> Found {
     look_around(mesh, other, reach_m, travel_m, patches);
     let mut found = Found::new();
     for number in 0..MAX_PATCHES {
@@ -63,9 +82,7 @@ pub(super) fn contact_points(
             patches.all[number].remember(found.end(&meeting.normal_M, are_several));
         }
     }
-    found.all().iter().for_each(|contact| told.tell(contact));
-    patches.all.iter_mut().enumerate().for_each(|(number, patch)| patch.carried = found.carried(number));
-    patches.put_a_pressed_one_first();
+    found
 }
 
 /// About where they meet: as in the last tick, or else found by going to and fro; `false` where they are far apart.

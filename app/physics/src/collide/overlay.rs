@@ -4,6 +4,10 @@
 //! of one over the other, and crossings of their outlines. A round rim gives four points, equally spaced, of which one is
 //! the deepest: so many equal springs press like the whole rim while all of them touch, and like its lowest point when it
 //! tips. While it stands flat no point is the deepest, and the one of before stays.
+//! Edges that are nearly parallel cross anywhere, now here and now there: of two boxes of one size
+//! that stand on each other, all four pairs or none, as micrometres have it. With such crossings as
+//! corners a stack had eight springs or four, and swayed for ever. A crossing counts as far as the
+//! outline of what both cover turns there.
 //! Signs: gaps along the normal, from B to A.
 
 use std::f64::consts::{FRAC_PI_2, TAU};
@@ -41,6 +45,8 @@ const EDGE_RIM_IDS: u32 = 512;
 const RIM_RIM_IDS: u32 = 768;
 const LINE_IDS: u32 = 1024;
 const POINT_ID: u32 = 1040;
+/// Turn of an outline from which on it has a whole corner \[rad\].
+const TURNS: f64 = 0.3;
 /// Into how many pieces a rim is cut in search of another.
 const PIECES: usize = 16;
 /// Rims that lie on each other do not cross, whatever rounding says.
@@ -67,17 +73,22 @@ impl Overlay<'_> {
     }
 
     /// A point of which both heights are known.
-    fn push(&mut self, id: u32, on: [Vector3<f64>; 2]) {
+    fn push(&mut self, id: u32, on: [Vector3<f64>; 2], share: f64) {
         let [radius_a, radius_b] = self.sides.map(|side| side.radius_m);
         let gap_m = self.normal.dot(&(on[A] - on[B])) - radius_a - radius_b;
         let on_a = on[A] - self.normal * radius_a;
-        self.spots.push(Spot { id, on_a, normal: self.normal, gap_m });
+        self.spots.push_share(Spot { id, on_a, normal: self.normal, gap_m }, share);
     }
 
     /// A point of `of`'s outline over the other's plate.
     fn push_over(&mut self, id: u32, of: usize, point: &Vector3<f64>, other: &View) {
+        self.push_share_over(id, of, point, other, 1.0);
+    }
+
+    /// The same, with a share of its depth.
+    fn push_share_over(&mut self, id: u32, of: usize, point: &Vector3<f64>, other: &View, share: f64) {
         let seen = other.onto(point);
-        self.push(id, if of == A { [*point, seen] } else { [seen, *point] });
+        self.push(id, if of == A { [*point, seen] } else { [seen, *point] }, share);
     }
 
     /// A line or a point over the plate of `plate_of`.
@@ -180,7 +191,11 @@ impl Overlay<'_> {
                     Outline::Disc { cap, .. } => EDGE_RIM_IDS + edge * 4 + cap * 2 + which as u32,
                     Outline::Endless => continue,
                 };
-                self.push_over(id, of, &(ends[0] + (ends[1] - ends[0]) * at), other);
+                let share = match other.plate().outline {
+                    Outline::Square { .. } => corner_share([plate.side(k), other.plate().side(cut)]),
+                    _ => 1.0,
+                };
+                self.push_share_over(id, of, &(ends[0] + (ends[1] - ends[0]) * at), other, share);
             }
         }
     }
@@ -211,6 +226,12 @@ impl Overlay<'_> {
             crossings += 1;
         }
     }
+}
+
+/// Share of a corner that two edges make which look there: all of one unless they look the same way.
+fn corner_share([one, other]: [Vector3<f64>; 2]) -> f64 {
+    // Twice the sine of half the turn.
+    ((one - other).norm() / TURNS).min(1.0)
 }
 
 fn numbers_of(side: usize) -> u32 {

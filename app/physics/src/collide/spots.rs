@@ -25,6 +25,8 @@ pub(super) struct Spots {
     all: [Spot; MAX_SPOTS],
     /// With what depth each counts \[m\].
     depths_m: [f64; MAX_SPOTS],
+    /// Part of its depth with which each would count alone.
+    shares: [f64; MAX_SPOTS],
     count: usize,
     /// No farther than this.
     reach_m: f64,
@@ -73,6 +75,7 @@ impl Spots {
         }
         self.all[self.count] = spot;
         self.depths_m[self.count] = counts_m;
+        self.shares[self.count] = share;
         self.count += 1;
     }
 
@@ -82,6 +85,7 @@ impl Spots {
         if self.count < MAX_SPOTS && counts_m > 0.0 && counts_m.is_finite() {
             self.all[self.count] = spot;
             self.depths_m[self.count] = counts_m;
+            self.shares[self.count] = part;
             self.count += 1;
         }
     }
@@ -106,6 +110,7 @@ impl Spots {
             if ids.contains(&self.all[at].id) {
                 self.all.copy_within(at + 1..self.count, at);
                 self.depths_m.copy_within(at + 1..self.count, at);
+                self.shares.copy_within(at + 1..self.count, at);
                 self.count -= 1;
             } else {
                 at += 1;
@@ -115,7 +120,7 @@ impl Spots {
 
     /// Reports them in W; `is_swapped`: the second form is A.
     pub(super) fn report(&self, X_W: &Isometry3<f64>, is_swapped: bool, found: &mut ContactPoints) {
-        for (spot, depth_m) in self.as_slice().iter().zip(self.depths_m) {
+        for ((spot, depth_m), share) in self.as_slice().iter().zip(self.depths_m).zip(self.shares) {
             let (mut on_a, mut normal) = (spot.on_a, spot.normal);
             if is_swapped {
                 (on_a, normal) = (on_a - normal * spot.gap_m, -normal);
@@ -125,7 +130,7 @@ impl Spots {
                 point_W: (X_W * Point3::from(on_a)).coords,
                 normal_W: X_W.rotation * normal,
                 gap_m: if spot.gap_m < 0.0 { -depth_m } else { spot.gap_m },
-                share: if spot.gap_m < 0.0 { depth_m / -spot.gap_m } else { 1.0 },
+                share: if spot.gap_m < 0.0 { depth_m / -spot.gap_m } else { share },
             });
         }
     }

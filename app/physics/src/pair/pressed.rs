@@ -52,6 +52,7 @@ pub(super) fn row(
         force_W: anchor.force_W(X_WB),
         torsion: Torsion::default(),
         rolling: Rolling::default(),
+        turning_m: [0.0; 2],
         tie_n: None,
     };
     let is_asked_for = surfacing.damping.is_ratio() || surfacing.response.restitution().is_some();

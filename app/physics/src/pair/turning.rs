@@ -4,7 +4,9 @@
 //! Model: torques about the normal and across it, each up to a length times the normal force (Coulomb's law, as along the
 //! surface). Within its limit each is that of a spring with the critical damper of what spins: the body is held at the rim of a patch of
 //! [`PATCH_M`] by springs as stiff as the contact's own. So what is held rests, and does not creep. On the limit the angle slides
-//! along. The normal force is that of the last tick.
+//! along. The normal force is that of the same tick, as along the surface: with that of the last one,
+//! points that press in every other tick turned each other while they did not touch, and light bodies
+//! between heavy ones hopped on for ever.
 //! Limits: three points and more of two entities resist turning by friction and springs, and this is left to them; and of
 //! integrators that take forces of the beginning of a tick there is none.
 //! Frames: an angle, times [`PATCH_M`], is kept in the other's frame ([`Anchor`]).
@@ -23,9 +25,8 @@ const PATCH_M: f64 = 3e-3;
 
 /// Gives a row its resistance to turning; `turned_W` is how far the body has been turned at the rim (m).
 pub(super) fn resist(row: &mut Row, surfacing: &Surfacing, turned_W: &Vector3<f64>, start: &Start<'_>) {
-    let normal_n = row.normal_W.dot(&row.force_W).max(0.0);
-    let [torsional_nm, rolling_nm] = surfacing.turning_m.map(|length_m| length_m * normal_n);
-    if torsional_nm.max(rolling_nm) == 0.0 || !start.is_implicit {
+    let [torsional_m, rolling_m] = surfacing.turning_m;
+    if torsional_m.max(rolling_m) == 0.0 || !start.is_implicit {
         return;
     }
     // In the mean of all axes.
@@ -38,16 +39,12 @@ pub(super) fn resist(row: &mut Row, surfacing: &Surfacing, turned_W: &Vector3<f6
     let damping_nm_s_per_rad = 2.0 * (stiffness_nm_per_rad / turns_per_kg_m2).sqrt();
     let rest_W = turned_W * (-stiffness_nm_per_rad / PATCH_M);
     let rest_nm = row.normal_W.dot(&rest_W);
-    row.torsion = Torsion {
-        rest_nm,
-        stiffness_nm_per_rad,
-        damping_nm_s_per_rad,
-        most_nm: torsional_nm,
-        torque_nm: rest_nm,
-    };
+    row.turning_m = surfacing.turning_m;
+    row.torsion =
+        Torsion { rest_nm, stiffness_nm_per_rad, damping_nm_s_per_rad, most_nm: 0.0, torque_nm: rest_nm };
     let rest_W = rest_W - row.normal_W * rest_nm;
     row.rolling =
-        Rolling { rest_W, stiffness_nm_per_rad, damping_nm_s_per_rad, most_nm: rolling_nm, torque_W: rest_W };
+        Rolling { rest_W, stiffness_nm_per_rad, damping_nm_s_per_rad, most_nm: 0.0, torque_W: rest_W };
 }
 
 /// Remembers how the tick ended: `turns_W` is how far the body has turned in it relative to the other (rad).
@@ -57,10 +54,10 @@ pub(super) fn settle(row: &Row, anchor: &mut Anchor, turns_W: &Vector3<f64>, X_W
         return anchor.turn_back(0.0);
     }
     // No spring is turned by more than the limit turns it. What the damper adds to the torque is not the spring's.
-    let most_m = |most_nm: f64| most_nm * PATCH_M / stiffness_nm_per_rad;
+    let limits_nm = row.most_turning_nm(row.presses_n(&row.force_W));
+    let [about_most_m, across_most_m] = limits_nm.map(|most_nm| most_nm * PATCH_M / stiffness_nm_per_rad);
     let turned_W = anchor.turned_W(X_WB) + turns_W * PATCH_M;
     let about_m = row.normal_W.dot(&turned_W);
-    let held_m = most_m(row.torsion.most_nm);
-    let across_W = within_ball(&(turned_W - row.normal_W * about_m), most_m(row.rolling.most_nm));
-    anchor.turn(&(across_W + row.normal_W * about_m.clamp(-held_m, held_m)), X_WB);
+    let across_W = within_ball(&(turned_W - row.normal_W * about_m), across_most_m);
+    anchor.turn(&(across_W + row.normal_W * about_m.clamp(-about_most_m, about_most_m)), X_WB);
 }

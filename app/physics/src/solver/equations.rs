@@ -6,7 +6,7 @@
 //!
 //! Measure of what is left: the kinetic energy of the impulses that are too much or too little, over that of all forces.
 
-use nalgebra::Vector3;
+use nalgebra::{Matrix3, Vector3};
 
 use super::blocks::Blocks;
 use super::link::{Link, SIGNS};
@@ -23,7 +23,7 @@ pub(super) struct Equations<'a> {
     pub(super) links: &'a [Link],
     pub(super) starts: &'a [Motion],
     pub(super) dt_s: f64,
-    /// Of each link, the most that friction holds \[N\], if that is not what the point is pressed with.
+    /// Of each link, what presses as far as friction knows \[N\], if that is not what does.
     pub(super) holds_n: Option<&'a [f64]>,
 }
 
@@ -99,7 +99,13 @@ impl Equations<'_> {
                 None => row.at_end_W(&velocity_W, self.dt_s),
                 Some(holds_n) => row.at_end_within_W(&velocity_W, self.dt_s, holds_n[at]),
             };
-            let torque_W = self.torque_at_end_W(link, row, moving);
+            let torque_W = if row.has_torque() {
+                let presses_n = self.presses_n(at, row, &velocity_W);
+                let (twist_nm, rolling_W) = row.turning_at_end(&link.spin_W(moving), self.dt_s, presses_n);
+                row.normal_W * twist_nm + rolling_W
+            } else {
+                Vector3::zeros()
+            };
             for (side, place) in link.inside() {
                 left[place] -= on_side(row, side, &force_W, &torque_W);
             }
@@ -108,7 +114,7 @@ impl Equations<'_> {
             let rounding_n = ROUNDING * along.max(across) * link.speed_m_s(row, moving);
             all += force_W.norm_squared() * gives;
             noise += rounding_n * rounding_n * gives;
-            if has_torque(row) {
+            if row.has_torque() {
                 let turns = link.most_turn(moving);
                 let falls = row.torsion.falls(self.dt_s).max(row.rolling.falls(self.dt_s));
                 let rounding_nm = ROUNDING * falls * link.most_spin_rad_s(moving);
@@ -142,15 +148,15 @@ impl Equations<'_> {
                 None => row.falls_at_end_W(&velocity_W, self.dt_s),
                 Some(holds_n) => row.falls_within_W(&velocity_W, self.dt_s, holds_n[at]),
             };
-            let turns = has_torque(row).then(|| {
-                let spin_rad_s = link.spin_rad_s(row, moving);
-                let twists = match chords {
-                    true => row.torsion.chord(spin_rad_s, self.dt_s),
-                    false => row.torsion.falls_at_end(spin_rad_s, self.dt_s),
+            let turns = row.has_torque().then(|| {
+                let presses_n = self.presses_n(at, row, &velocity_W);
+                let spin_W = link.spin_W(moving);
+                let by_spin = row.turning_falls_W(&spin_W, self.dt_s, presses_n, chords);
+                let by_velocity = match self.holds_n {
+                    None => row.turning_falls_by_velocity_W(&spin_W, self.dt_s, presses_n),
+                    Some(_) => Matrix3::zeros(),
                 };
-                let n = &row.normal_W;
-                let rolls_W = link.rolls_W(row, moving);
-                n * n.transpose() * twists + row.rolling.falls_at_end_W(n, &rolls_W, self.dt_s)
+                [by_velocity, by_spin]
             });
             link.add_falls(row, &falls, turns.as_ref(), blocks);
         }
@@ -175,19 +181,21 @@ impl Equations<'_> {
         for link in self.links {
             let row = &mut rows[link.row];
             row.force_W = row.at_end_W(&link.velocity_W(row, moving), self.dt_s);
-            row.torsion.torque_nm = row.torsion.at_end_nm(link.spin_rad_s(row, moving), self.dt_s);
-            row.rolling.torque_W = row.rolling.at_end_W(&link.rolls_W(row, moving), self.dt_s);
+            if row.has_torque() {
+                let presses_n = row.presses_n(&row.force_W);
+                (row.torsion.torque_nm, row.rolling.torque_W) =
+                    row.turning_at_end(&link.spin_W(moving), self.dt_s, presses_n);
+            }
         }
     }
 
-    /// The row's torque beside that of its force.
+    /// What presses at a link, as far as friction knows \[N\].
     #[inline]
-    fn torque_at_end_W(&self, link: &Link, row: &Row, moving: &[Motion]) -> Vector3<f64> {
-        if !has_torque(row) {
-            return Vector3::zeros();
+    pub(super) fn presses_n(&self, link: usize, row: &Row, velocity_W: &Vector3<f64>) -> f64 {
+        match self.holds_n {
+            None => row.presses_n(&row.trial_at_end_W(velocity_W, self.dt_s)),
+            Some(holds_n) => holds_n[link],
         }
-        let twist_nm = row.torsion.at_end_nm(link.spin_rad_s(row, moving), self.dt_s);
-        row.normal_W * twist_nm + row.rolling.at_end_W(&link.rolls_W(row, moving), self.dt_s)
     }
 
     /// Of two sets of impulses, by their kinetic energy \[J\]: `a W b`.
@@ -205,12 +213,6 @@ impl Equations<'_> {
         self.settle(rows, moving);
         self.links.iter().fold(false, |any, link| lets_slip(&mut rows[link.row]) | any)
     }
-}
-
-/// True of a row that may have a torque beside that of its force.
-#[inline]
-fn has_torque(row: &Row) -> bool {
-    row.torsion.most_nm > 0.0 || row.rolling.most_nm > 0.0
 }
 
 /// Force and torque of a contact point (N, N m) as one of its sides gets them.

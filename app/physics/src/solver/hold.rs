@@ -32,8 +32,8 @@ pub(super) enum Begin {
 }
 
 impl Hold<'_> {
-    /// Leads `now` to near the answer; says how many rounds that took, at most so many. `holds_n` has room for what friction
-    /// holds in each point.
+    /// Leads `now` to near the answer; says how many rounds that took, at most so many. `holds_n` has
+    /// room for what presses each point as far as friction knows.
     pub(super) fn run(
         &mut self,
         equations: &Equations<'_>,
@@ -72,7 +72,7 @@ impl Hold<'_> {
         for (link, holds_n) in equations.links.iter().zip(all_n) {
             let row = &rows[link.row];
             let trial_W = row.trial_at_end_W(&link.velocity_W(row, &self.now.moving), equations.dt_s);
-            let now_n = row.holds_n(&trial_W);
+            let now_n = row.presses_n(&trial_W);
             changed_n = changed_n.max((now_n - *holds_n).abs());
             most_n = most_n.max(now_n);
             *holds_n = now_n;

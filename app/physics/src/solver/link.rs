@@ -57,23 +57,10 @@ impl Link {
 
     /// Angular velocity of the body relative to the other (rad/s).
     #[inline]
-    fn spin_W(&self, moving: &[Motion]) -> Vector3<f64> {
+    pub(super) fn spin_W(&self, moving: &[Motion]) -> Vector3<f64> {
         self.inside().fold(self.given_spin_W, |spin_W, (side, place)| {
             spin_W + moving[place].angular_velocity_W * SIGNS[side]
         })
-    }
-
-    /// The part of that about the normal (rad/s).
-    #[inline]
-    pub(super) fn spin_rad_s(&self, row: &Row, moving: &[Motion]) -> f64 {
-        row.normal_W.dot(&self.spin_W(moving))
-    }
-
-    /// The part of that across the normal (rad/s).
-    #[inline]
-    pub(super) fn rolls_W(&self, row: &Row, moving: &[Motion]) -> Vector3<f64> {
-        let spin_W = self.spin_W(moving);
-        spin_W - row.normal_W * row.normal_W.dot(&spin_W)
     }
 
     /// The most velocity that an impulse gives to the point, in whatever direction (1/kg).
@@ -134,23 +121,25 @@ impl Link {
     }
 
     /// Adds, for each two sides, by how much the first one's force and torque fall with the second one's velocity and spin:
-    /// the point's force by `falls` (N s/m), its torque by `turns` (N m s), if there is any.
+    /// the point's force by `falls` (N s/m), its torque by `turns`, if there is any: by the first with
+    /// the point's velocity (N s), by the second with the spin (N m s).
     #[inline]
     pub(super) fn add_falls(
         &self,
         row: &Row,
         falls: &Matrix3<f64>,
-        turns: Option<&Matrix3<f64>>,
+        turns: Option<&[Matrix3<f64>; 2]>,
         blocks: &mut Blocks,
     ) {
         for (by_side, by_place) in self.inside() {
             // Of the force, by velocity and spin: `D` and `-D [s]`.
             let s = &row.arms_W[by_side];
-            let of_force = [0, 1, 2].map(|at| {
+            let by_both = |falls: &Matrix3<f64>, at: usize| {
                 let d = Vector3::new(falls[(at, 0)], falls[(at, 1)], falls[(at, 2)]);
                 let turned = s.cross(&d);
                 [d.x, d.y, d.z, turned.x, turned.y, turned.z]
-            });
+            };
+            let of_force = [0, 1, 2].map(|at| by_both(falls, at));
             for (side, place) in self.inside() {
                 let r = &row.arms_W[side];
                 let sign = SIGNS[side] * SIGNS[by_side];
@@ -162,9 +151,10 @@ impl Link {
                     add(&mut block[3 + at], &of_force[last], sign * r[next]);
                     add(&mut block[3 + at], &of_force[next], -sign * r[last]);
                 }
-                if let Some(turns) = turns {
-                    for (at, by) in (0..9).map(|at| (at / 3, at % 3)) {
-                        block[3 + at][3 + by] += sign * turns[(at, by)];
+                if let Some([by_velocity, by_spin]) = turns {
+                    for at in 0..3 {
+                        add(&mut block[3 + at], &by_both(by_velocity, at), sign);
+                        (0..3).for_each(|by| block[3 + at][3 + by] += sign * by_spin[(at, by)]);
                     }
                 }
             }

@@ -12,11 +12,13 @@
 //! is), what such turns leave stands, and is said to be unsolved.
 //! Cost: at most [`MAX_SWEEPS`] rounds of all ways together, of large islands as many as [`MOST_PRODUCTS`] leave.
 
+use nalgebra::Vector3;
+
 use super::blocks::{self, Blocks};
 use super::equations::{Equations, Trial};
 use super::hold::{Begin, Hold};
 use super::link::Link;
-use super::six::Vector6;
+use super::six::{Vector6, joined};
 use super::{MAX_SWEEPS, Motion, Solved, relax};
 use crate::row::Row;
 
@@ -51,6 +53,8 @@ pub(super) struct Newton {
     change: Vec<Vector6>,
     blocks: Blocks,
     holds_n: Vec<f64>,
+    /// Velocity that gravity has given to all bodies in the tick \[m/s\].
+    pub(super) fall_W: Vector3<f64>,
 }
 
 impl Newton {
@@ -66,6 +70,7 @@ impl Newton {
             change: Vec::with_capacity(bodies),
             blocks: Blocks::with_capacity(bodies),
             holds_n: Vec::with_capacity(rows),
+            fall_W: Vector3::zeros(),
         }
     }
 
@@ -118,12 +123,12 @@ impl Newton {
     }
 
     fn solve(&mut self, rows: &mut [Row], dt_s: f64) -> Solved {
-        let Self { links, starts, now, next, best, change, blocks, holds_n } = self;
+        let Self { links, starts, now, next, best, change, blocks, holds_n, fall_W } = self;
         let equations = Equations { links, starts, dt_s, holds_n: None };
         let most_rounds = (MOST_PRODUCTS / blocks.products().max(1)).clamp(1, MAX_SWEEPS);
         let mut search =
             Search { equations, now, next, best, change, blocks, holds_n, rounds: 0, most_rounds };
-        search.run(rows)
+        search.run(rows, fall_W)
     }
 }
 
@@ -141,14 +146,14 @@ struct Search<'a> {
 }
 
 impl Search<'_> {
-    fn run(&mut self, rows: &mut [Row]) -> Solved {
+    fn run(&mut self, rows: &mut [Row], fall_W: &Vector3<f64>) -> Solved {
         for link in self.equations.links {
             let row = &mut rows[link.row];
             row.force_W = row.project(&row.force_W);
-            row.torsion.begin();
-            row.rolling.begin();
+            row.begin_torque();
         }
         self.equations.impulses(rows, self.now);
+        self.go_on(rows, fall_W);
         let is_found = self.find(rows);
         if is_found {
             self.equations.settle(rows, &self.now.moving);
@@ -160,6 +165,28 @@ impl Search<'_> {
         self.equations.impulses(rows, self.now);
         self.equations.moving(self.now);
         solved
+    }
+
+    /// Begins with the velocities of the last tick if less is left with them than with its forces:
+    /// hard points make much of a small error of these.
+    fn go_on(&mut self, rows: &[Row], fall_W: &Vector3<f64>) {
+        if *fall_W == Vector3::zeros() {
+            return;
+        }
+        self.equations.evaluate(rows, self.now, 1.0);
+        if self.now.is_within(SOLVED) {
+            return;
+        }
+        let back = |start: &Motion| {
+            let mass_kg = if start.inverse_mass > 0.0 { start.inverse_mass.recip() } else { 0.0 };
+            joined(&(fall_W * -mass_kg), &Vector3::zeros())
+        };
+        self.next.p.clear();
+        self.next.p.extend(self.equations.starts.iter().map(back));
+        self.equations.evaluate(rows, self.next, 1.0);
+        if self.next.left_j < self.now.left_j {
+            std::mem::swap(self.now, self.next);
+        }
     }
 
     /// Says whether there is an answer, at `now`.
@@ -313,11 +340,15 @@ impl Search<'_> {
     /// Whether a whole step may lead too far because torques at their limit do not change on the way, until they turn over:
     /// the slopes of their chords lead back to where they do.
     fn is_at_limit(&self, rows: &[Row]) -> bool {
-        self.equations.links.iter().any(|link| {
-            let torsion = &rows[link.row].torsion;
-            torsion.most_nm > 0.0 && {
-                let spin_rad_s = link.spin_rad_s(&rows[link.row], &self.now.moving);
-                torsion.falls_at_end(spin_rad_s, self.equations.dt_s) == 0.0
+        let dt_s = self.equations.dt_s;
+        self.equations.links.iter().enumerate().any(|(at, link)| {
+            let row = &rows[link.row];
+            row.has_torque() && {
+                let velocity_W = link.velocity_W(row, &self.now.moving);
+                let presses_n = self.equations.presses_n(at, row, &velocity_W);
+                let spin_rad_s = row.normal_W.dot(&link.spin_W(&self.now.moving));
+                let [most_nm, _] = row.most_turning_nm(presses_n);
+                most_nm > 0.0 && row.torsion.falls_at_end(spin_rad_s, dt_s, most_nm) == 0.0
             }
         })
     }

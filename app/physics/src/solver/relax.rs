@@ -18,19 +18,18 @@ pub(super) fn turns(equations: &Equations<'_>, rows: &mut [Row], moving: &mut [M
         let change_W = row.project(&wanted_W) - row.force_W;
         row.force_W += change_W;
         link.push(row, &(change_W * dt_s), moving);
-        if row.torsion.most_nm > 0.0 {
-            let asked_nm = row.torsion.at_end_nm(link.spin_rad_s(row, moving), dt_s);
+        if row.has_torque() {
+            let presses_n = row.presses_n(&row.force_W);
+            let asked_nm = row.turning_at_end(&link.spin_W(moving), dt_s, presses_n).0;
             let share = 1.0 / (1.0 + row.torsion.falls(dt_s) * link.turn_about(row, moving) * dt_s);
             let change_nm = (asked_nm - row.torsion.torque_nm) * share;
             row.torsion.torque_nm += change_nm;
             link.turn(&(row.normal_W * (change_nm * dt_s)), moving);
-        }
-        if row.rolling.most_nm > 0.0 {
-            let rolling = &row.rolling;
-            let missing_W = rolling.at_end_W(&link.rolls_W(row, moving), dt_s) - rolling.torque_W;
-            let share = 1.0 / (1.0 + rolling.falls(dt_s) * link.most_turn(moving) * dt_s);
-            row.rolling.torque_W += missing_W * share;
-            link.turn(&(missing_W * (share * dt_s)), moving);
+            let asked_W = row.turning_at_end(&link.spin_W(moving), dt_s, presses_n).1;
+            let share = 1.0 / (1.0 + row.rolling.falls(dt_s) * link.most_turn(moving) * dt_s);
+            let change_W = (asked_W - row.rolling.torque_W) * share;
+            row.rolling.torque_W += change_W;
+            link.turn(&(change_W * dt_s), moving);
         }
     }
 }

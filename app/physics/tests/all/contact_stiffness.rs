@@ -243,7 +243,13 @@ fn round_meshes_that_are_put_down_stand_upright_and_rest_within_a_second() {
 /// Six stacks of six, a tenth of a millimetre apart, that lean on each other.
 #[test]
 fn a_dense_pile_is_solved_and_comes_to_rest() {
-    for (name, stiffness) in [("as felt", ContactStiffness::AsFelt), ("by mass", BY_MASS)] {
+    // Where edges cross of two cubes that are turned by next to nothing, there had been four more
+    // points, or none.
+    let softer = ContactStiffness::Given { stiffness_n_per_m: 0.02 * 500.0_f64.powi(2), damping_ratio: 1.0 };
+    // What is softer sways for longer: the slowest sway falls by e in 0.45 s at 500 rad/s.
+    for (name, stiffness, seconds) in
+        [("as felt", ContactStiffness::AsFelt, 1.0), ("500 rad/s", softer, 3.5), ("by mass", BY_MASS, 1.0)]
+    {
         let places = (0..36).map(|n| [n / 12, n / 2 % 6, n % 2].map(f64::from));
         let things = places.map(|[x, y, z]| {
             let at = Isometry3::translation(0.0201 * x, 0.011 + 0.0205 * y, 0.0201 * z);
@@ -254,7 +260,7 @@ fn a_dense_pile_is_solved_and_comes_to_rest() {
         for _ in 0..500 {
             table.manipulation.step(&mut table.entities, &mut [], table.dt_s);
         }
-        table.run(1.0);
+        table.run(seconds);
         let speeds = table.manipulation.bodies().iter().map(|body| body.velocity_W.norm());
         let fastest = speeds.fold(0.0, f64::max);
         // A thousandth of what can be seen to move in a second.

@@ -352,3 +352,22 @@ fn however_small_a_form_is_all_its_corners_carry() {
         }
     }
 }
+
+/// Edges that are nearly parallel cross anywhere: a face has the stiffness of its corners all the same.
+#[test]
+fn boxes_of_one_size_stand_on_each_other_on_four_corners_however_they_are_turned() {
+    let cube: Form = Cuboid::new([0.02; 3]).unwrap().into();
+    for turned in [0.0, 1e-9, -1e-7, 3e-6, -1e-4, 1e-3, -0.02] {
+        for aside in [[0.0, 0.0], [1e-7, -3e-8], [2e-6, 1e-6], [-1e-5, 3e-5]] {
+            let at = Vector3::new(aside[0], 0.02 - 1e-5, aside[1]);
+            let X = pose(about(Vector3::y(), turned), at);
+            let found = points(&cube, &X, &cube, &Isometry3::identity(), REACH, &mut PairMemory::default());
+            let corners: f64 = found.iter().map(|point| point.share).sum();
+            // Beside them, a crossing of an edge and its neighbour counts as far as the outline turns there.
+            let most = 4.0 + 4.0 * f64::abs(turned) / 0.3 + 1e-6;
+            assert!((3.99..=most).contains(&corners), "{turned} {aside:?}: {corners}");
+            let whole = found.iter().filter(|point| point.share > 0.5).count();
+            assert_eq!(whole, 4, "{turned} {aside:?}");
+        }
+    }
+}

@@ -39,6 +39,7 @@ fn row(body: usize, other: Option<usize>) -> Row {
         force_W: Vector3::zeros(),
         torsion: Torsion::default(),
         rolling: Rolling::default(),
+        turning_m: [0.0; 2],
         tie_n: None,
     }
 }

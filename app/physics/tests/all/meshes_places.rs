@@ -7,10 +7,12 @@ use crate::{common, meshes};
 
 use std::f64::consts::FRAC_PI_2;
 
+use crate::noise::Noise;
+use crate::thrown::{KINDS, shape};
 use common::*;
 use haptics::mesh::{TriangleSoup, make};
 use haptics::{Cuboid, Cylinder, Entity, Friction, Shape};
-use meshes::{block_with_hole, build, cells, cut_in_four};
+use meshes::{angle, block_with_hole, build, cells, cut_in_four};
 use nalgebra::{Isometry3, Matrix3, UnitQuaternion, Vector3};
 use physics::Settings;
 use physics::collide::{ContactPoints, PairMemory, Solid, contact_points};
@@ -374,4 +376,39 @@ fn a_peg_thrown_about_in_its_hole_gains_no_energy() {
 #[ignore = "half a minute; see the top of the file"]
 fn a_peg_thrown_about_in_many_ways_gains_no_energy() {
     throw_pegs(&[(-0.07, -1.0), (0.2, 0.0), (0.05, 5.0), (-0.15, 2.0)]);
+}
+
+/// What does not move touches in every tick if it does in any: the plane of the last tick's points
+/// may show none of them.
+#[test]
+fn what_stands_still_does_not_touch_in_every_other_tick_only() {
+    let noise = &mut Noise::new(3);
+    let (mesh, X_WM): (Shape, _) = (build(angle()).into(), Isometry3::identity());
+    let mut pressed = 0;
+    for scene in 0..3000 {
+        let shape = shape(KINDS[noise.below(KINDS.len())], noise);
+        let (turn, way) = (noise.turn(), noise.direction());
+        let (inside, outside) = (noise.vector(0.02), noise.log_within(1e-7, 1e-5));
+        let touch = |away_m: f64, memory: &mut PairMemory| {
+            let X_W = Isometry3::from_parts((inside + way * away_m).into(), turn);
+            let mut found = ContactPoints::default();
+            let (a, b) = (Solid { shape: &shape, X_W: &X_W }, Solid { shape: &mesh, X_W: &X_WM });
+            contact_points(a, b, 1e-3, memory, &mut found);
+            found.as_slice().iter().any(|point| point.gap_m < 0.0)
+        };
+        // From where they come apart, so much nearer.
+        let (mut near_m, mut far_m) = (0.0, 0.2);
+        for _ in 0..50 {
+            let middle_m = 0.5 * (near_m + far_m);
+            let is_in = touch(middle_m, &mut PairMemory::default());
+            (near_m, far_m) = if is_in { (middle_m, far_m) } else { (near_m, middle_m) };
+        }
+        let memory = &mut PairMemory::default();
+        let at_m = near_m - outside;
+        let touches: Vec<bool> = (0..8).map(|_| touch(at_m, memory)).collect();
+        let changes = touches[2..].windows(2).filter(|two| two[0] != two[1]).count();
+        assert!(changes <= 1, "{scene}: {touches:?}");
+        pressed += usize::from(touches[7]);
+    }
+    assert!(pressed > 1500, "{pressed}");
 }

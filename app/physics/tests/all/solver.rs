@@ -46,6 +46,7 @@ fn row(noise: &mut Noise, size: f64, stiffness: f64, mu: f64) -> Row {
         force_W: normal_W * stiffness * noise.within(0.0, 1e-3),
         torsion: Torsion::default(),
         rolling: Rolling::default(),
+        turning_m: [0.0; 2],
         tie_n: None,
     }
 }

@@ -165,3 +165,41 @@ fn several_rows_that_turn_over_within_the_tick_agree_with_the_spin_that_they_lea
     // Found 4.2 in the mean.
     assert!(sum < 5 * count, "{sum} rounds for {count} bodies");
 }
+
+/// A ball on one point without sliding friction: `m (u - u0) = dt N` with `N = rest - c u`, and the
+/// spin changes by `dt s N / I` about the normal and across it. What does not press does not turn
+/// either, whatever it did a tick ago.
+#[test]
+fn torques_that_grow_with_what_presses_are_those_of_the_same_tick() {
+    let (n, mass, inertia) = (Vector3::new(2.0, 1.0, -2.0) / 3.0, 0.05, 2e-5);
+    let across = Vector3::new(1.0, 0.0, 1.0) / 2.0_f64.sqrt();
+    let [about_m, across_m] = [3e-4, 2e-4];
+    for u0 in [-0.5, -0.01, 0.0, 0.003, 0.5] {
+        let resists = |most_nm| Torsion { damping_nm_s_per_rad: 0.1, most_nm, torque_nm: 1e-3, ..PAD };
+        let mut row = Row::turning(0, n, resists(0.0));
+        row.rolling.damping_nm_s_per_rad = 0.1;
+        row.rolling.torque_W = across * 1e-3;
+        row.turning_m = [about_m, across_m];
+        row.arms_W[0] = n * -0.01;
+        (row.stiffness[0], row.damping[0], row.rest_W) = (2e5, 20.0, n * 0.5);
+        let spin_W = n * 200.0 - across * 300.0;
+        let mut motions = [Motion {
+            velocity_W: n * u0,
+            angular_velocity_W: spin_W,
+            inverse_mass: 1.0 / mass,
+            inverse_inertia_W: Matrix3::from_diagonal_element(1.0 / inertia),
+        }];
+        let mut rows = [row];
+        let made = Solver::with_capacity(1, 1).solve(&mut rows, &mut motions, DT);
+        assert_eq!(made.unsolved, 0);
+        let c = 2e5 * DT + 20.0;
+        let presses_n = ((0.5 - c * u0) / (1.0 + DT * c / mass)).max(0.0);
+        let expected_W = (across * across_m - n * about_m) * presses_n;
+        let found_W = n * rows[0].torsion.torque_nm + rows[0].rolling.torque_W;
+        // Roundings of numbers of that size.
+        assert!((found_W - expected_W).norm() <= 1e-12 * (presses_n + 1.0) * about_m, "{u0}: {found_W}");
+        let turned_W = motions[0].angular_velocity_W - spin_W - expected_W * (DT / inertia);
+        assert!(turned_W.norm() < 1e-9, "{u0}: {turned_W}");
+        assert_eq!(presses_n == 0.0, rows[0].force_W == Vector3::zeros(), "{u0}");
+    }
+}
