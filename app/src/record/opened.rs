@@ -7,9 +7,10 @@
 //! is reserved then ([`Opened::start`]); that its beginning alone will fit is found out before the run
 //! ([`Opened::reserve`]). The piece is written over the content, in whose room and the reserved one it lies: also on a disk
 //! that others fill meanwhile. File systems that copy what is written over (btrfs) or that reserve nothing may refuse the piece
-//! itself: there the room for it, and for the content once more, is tried in a file without a name beside it first. The rest of the content is cut off behind the piece and not before;
-//! what was written over is put back if anything is refused. Until then the first byte is [`HALF_REPLACED`], so that nobody
-//! takes what a killed process leaves for one recording. Any other file begins at once.
+//! itself: there the room for it, and for the content once more, is tried in a file without a name beside it first. The rest of
+//! the content is cut off behind the piece and not before; what was written over is put back if anything is refused. Until then
+//! the first byte is [`HALF_REPLACED`], so that nobody takes what a killed process leaves for one recording. Any other file
+//! begins at once.
 //! Invariant: what was opened and not started is as it was: a file that was made here is removed again.
 
 use super::destination::{is_standard_output, shown};
@@ -249,6 +250,9 @@ impl Opened {
             }
             Err(NotReplaced { why, is_as_before: true }) => {
                 self.content.store(Content::Earlier);
+                if let (Some([before, _]), Ok(found)) = (self.changed.get(), self.file.metadata()) {
+                    self.changed.set(found.modified().ok().map(|now| [before, now]));
+                }
                 Err(why)
             }
             Err(NotReplaced { why, is_as_before: false }) => {
@@ -271,8 +275,11 @@ impl Opened {
         let length = self.file.metadata().map_err(as_before)?.len();
         let replaced = self.contents_first(piece.len());
         // Else others of this process take the room that is found.
-        let _alone = ALONE.lock().unwrap_or_else(PoisonError::into_inner);
-        self.try_room(piece, replaced.as_deref().unwrap_or_default()).map_err(as_before)?;
+        let lock = || ALONE.lock().unwrap_or_else(PoisonError::into_inner);
+        let alone = (!self.keeps_reserved_room()).then(lock);
+        if alone.is_some() {
+            self.try_room(piece, replaced.as_deref().unwrap_or_default()).map_err(as_before)?;
+        }
         let Some((first, rest)) = piece.split_first() else { return cut().map_err(as_before) };
         self.content.store(Content::BeingReplaced);
         let written = (&self.file).write_all(&[HALF_REPLACED]).and_then(|()| (&self.file).write_all(rest));
@@ -304,9 +311,6 @@ impl Opened {
     /// Finds out whether a piece can be written over the content, and that back, where room that is reserved is no promise: on file
     /// systems that copy what is written over, or that reserve none.
     fn try_room(&self, piece: &[u8], replaced: &[u8]) -> io::Result<()> {
-        if self.keeps_reserved_room() {
-            return Ok(());
-        }
         // What a file system takes for the first byte alone, which is written once more.
         let block = vec![HALF_REPLACED; BLOCK_BYTES];
         if let Some(mut trial) = self.nameless_beside() {
