@@ -58,6 +58,8 @@ pub struct Entity {
     pub restitution: Option<f64>,
     /// Of each point where another entity touches it \[N/m\], > 0; no finger feels it. `None`: nobody says.
     pub contact_stiffness_n_per_m: Option<f64>,
+    /// Its stiffness is what somebody has chosen for it: between two such entities it counts, too.
+    pub is_stiffness_said: bool,
     /// Torque about the normal, per normal force, up to which a contact with another entity does not spin \[m\]; no finger feels it.
     pub torsional_friction_m: f64,
     /// The like across the normal, up to which it does not roll \[m\].
@@ -102,6 +104,7 @@ impl Entity {
             face_materials: None,
             restitution: None,
             contact_stiffness_n_per_m: None,
+            is_stiffness_said: false,
             torsional_friction_m: 0.0,
             rolling_friction_m: 0.0,
             algorithm: Algorithm::FrictionCone,
@@ -136,6 +139,12 @@ impl Entity {
     pub fn with_contact_stiffness(self, stiffness_n_per_m: f64) -> Result<Self, ParameterError> {
         let stiffness_n_per_m = above_zero("contact_stiffness_n_per_m", stiffness_n_per_m)?;
         Ok(Self { contact_stiffness_n_per_m: Some(stiffness_n_per_m), ..self })
+    }
+
+    /// With a stiffness that somebody has chosen for it.
+    #[must_use]
+    pub fn with_said_stiffness(self, is_stiffness_said: bool) -> Self {
+        Self { is_stiffness_said, ..self }
     }
 
     /// With this resistance to turning in its contacts with other entities: torsional friction (about the normal) and rolling

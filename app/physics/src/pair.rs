@@ -262,7 +262,8 @@ impl Pair {
     /// Takes what its impulses put in from what the tick took from the bodies (J): that the tick has not taken. What is more is owed:
     /// an impulse has pushed a body into the spring of another pair. For all pairs, before any of them [settles](Self::settle).
     pub(crate) fn take_impulses(&self, end: &End<'_>, spare_j: &mut [f64]) {
-        if self.surfacing.response.restitution().is_none() {
+        // Without rows its places are of another tick.
+        if self.rows == 0 || self.surfacing.response.restitution().is_none() {
             return;
         }
         let put_in_w = |row: &Row| (row.force_W - self.of_spring_W(row)).dot(&velocity(row, end.motions));

@@ -202,7 +202,8 @@ pub(crate) fn check_begin(file: &Path) -> Result<(), ReadError> {
     opened.map_err(|source| ReadError::Io { file: file.into(), source })?;
     let why = match &begin[..] {
         [] => Some("it is empty"),
-        [HALF_REPLACED, ..] => Some(
+        // More of them are a hole in a file.
+        [HALF_REPLACED, next, ..] if *next != HALF_REPLACED => Some(
             "whoever wrote it was killed while it took the place of an earlier one, and what it has may be of both",
         ),
         begin if input_file::is_utf16(begin) => Some(input_file::UTF16),

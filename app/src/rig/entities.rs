@@ -35,6 +35,7 @@ impl Rig {
                 entity.with_turning_friction(spec.torsional_friction_m, spec.rolling_friction_m)
             })
             .map(|entity| entity.with_algorithm(algorithm).with_shading(shading))
+            .map(|entity| entity.with_said_stiffness(spec.is_stiffness_said))
             .map_err(refused)?;
         let entity = if spec.faces.is_empty() {
             entity

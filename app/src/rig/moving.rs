@@ -63,6 +63,7 @@ impl Rig {
             contact_stiffness: match dynamics.stiffness {
                 ContactStiffnessSpec::AsFelt => ContactStiffness::AsFelt,
                 ContactStiffnessSpec::ByMass { damping_ratio } => ContactStiffness::ByMass { damping_ratio },
+                ContactStiffnessSpec::AsSaid { damping_ratio } => ContactStiffness::AsSaid { damping_ratio },
                 ContactStiffnessSpec::Given { stiffness_n_per_m, damping_ratio } => {
                     ContactStiffness::Given { stiffness_n_per_m, damping_ratio }
                 }

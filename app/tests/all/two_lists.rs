@@ -113,7 +113,8 @@ fn a_large_island_that_has_not_come_yet_is_felt_as_one_that_is_fixed_until_all_o
     }
     // 60 cubes and their 119 pairs, of which none has touched yet, 64 parcels a tick: they are there in the third one.
     assert_eq!((waited, coming.here()), (2, 60));
-    assert!(coming.step.bodies()[0].velocity.x > 0.01, "it gives way: {:?}", coming.step.bodies()[0]);
+    // Some 2 N on 6 kg.
+    assert!(coming.step.bodies()[0].velocity.x > 1e-4, "it gives way: {:?}", coming.step.bodies()[0]);
 }
 
 #[test]

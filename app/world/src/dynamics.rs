@@ -69,10 +69,14 @@ pub enum ResponseSpec {
 }
 
 /// Stiffness of contacts between entities that do not say it themselves; their dampers are this share of the critical one.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub enum ContactStiffnessSpec {
+    /// As felt between two that both say `stiffness_n_per_m`, by mass otherwise.
+    AsSaid {
+        /// 1: critical.
+        damping_ratio: f64,
+    },
     /// As fingers feel both surfaces, with both dampers.
-    #[default]
     AsFelt,
     /// By the mass of the heaviest thing that moves.
     ByMass {
@@ -86,6 +90,12 @@ pub enum ContactStiffnessSpec {
         /// 1: critical.
         damping_ratio: f64,
     },
+}
+
+impl Default for ContactStiffnessSpec {
+    fn default() -> Self {
+        Self::AsSaid { damping_ratio: 1.0 }
+    }
 }
 
 impl Default for ResponseSpec {
@@ -149,7 +159,7 @@ impl ContactStiffnessSpec {
     fn read(value: &Value<'_>) -> Result<Self, SceneError> {
         let table = value.table(STIFFNESS_EXAMPLE)?;
         table.check_keys(&STIFFNESS_KEYS)?;
-        let kind = table.require("kind", "by-mass, as-felt, given")?;
+        let kind = table.require("kind", "as-said, by-mass, as-felt, given")?;
         let kind = kind.choose("contact stiffness", &STIFFNESSES)?;
         let damping_ratio = table.number_or("damping_ratio", Bound::NotNegative, 1.0)?;
         let unfit = |key: &str, allowed: &str| match table.get(key) {
@@ -167,9 +177,12 @@ impl ContactStiffnessSpec {
                 unfit("stiffness_n_per_m", "none, but with kind = \"given\"")?;
                 Ok(Self::AsFelt)
             }
-            _ => {
+            kind => {
                 unfit("stiffness_n_per_m", "none, but with kind = \"given\"")?;
-                Ok(Self::ByMass { damping_ratio })
+                Ok(match kind {
+                    "by-mass" => Self::ByMass { damping_ratio },
+                    _ => Self::AsSaid { damping_ratio },
+                })
             }
         }
     }
@@ -210,7 +223,8 @@ const STIFFNESS_EXAMPLE: &str = "a table such as { kind = \"by-mass\", damping_r
                                  { kind = \"given\", stiffness_n_per_m = 1e5 }";
 const STIFFNESS_KEYS: Vocabulary =
     Vocabulary { available: &["kind", "stiffness_n_per_m", "damping_ratio"], later: &[] };
-const STIFFNESSES: Vocabulary = Vocabulary { available: &["by-mass", "as-felt", "given"], later: &[] };
+const STIFFNESSES: Vocabulary =
+    Vocabulary { available: &["as-said", "by-mass", "as-felt", "given"], later: &[] };
 const RESPONSES: Vocabulary = Vocabulary { available: &["force", "impulse"], later: &[] };
 const INTEGRATORS: Vocabulary = Vocabulary {
     available: &["implicit", "rk4", "thesis-euler", "thesis-euler-gyroscopic", "thesis-euler-printed"],

@@ -40,6 +40,8 @@ pub struct SceneEntity {
     pub pose: Isometry3<f64>,
     /// Normal force per depth; above 0, default [`SceneEntity::DEFAULT_STIFFNESS_N_PER_M`].
     pub stiffness_n_per_m: f64,
+    /// It says that itself: it is neither the default nor a material's.
+    pub is_stiffness_said: bool,
     /// Normal force per speed of approach; 0 or more, default 0, or [`MotionSpec::DEFAULT_DAMPING_N_S_PER_M`] if it moves.
     pub damping_n_s_per_m: f64,
     /// Default none.
@@ -197,6 +199,7 @@ impl SceneEntity {
             friction: friction?,
             faces: faces?,
             restitution: restitution?,
+            is_stiffness_said: table.get("stiffness_n_per_m").is_some(),
             contact_stiffness_n_per_m: contact_stiffness_n_per_m?,
             torsional_friction_m: torsional_friction_m?,
             rolling_friction_m: rolling_friction_m?,

@@ -397,11 +397,13 @@ fn refused_with(answer: Answer, ask: fn(&Path) -> Result<(), AttachError>) -> At
 #[test]
 fn who_may_not_is_told_who_may() {
     let user = rustix::process::geteuid().as_raw();
-    for (allowed_group_plus_one, allowed) in [
-        (0, "root and the user that the driver runs as"),
-        (1, "members of group 0 (root)"),
-        (4_000_000_001, "members of group 4000000000"),
-    ] {
+    let owners = match user {
+        0 => "root and the user that the driver runs as, by the numbers of the driver's own user namespace,",
+        _ => "root and the user that the driver runs as",
+    };
+    for (allowed_group_plus_one, allowed) in
+        [(0, owners), (1, "members of group 0 (root)"), (4_000_000_001, "members of group 4000000000")]
+    {
         let answer = Answer { allowed_group_plus_one, ..Answer::new(Verdict::NotAllowed) };
         let refusal = refused_with(answer, |socket| client::end_lease(socket, "today")).to_string();
         let expected = format!(

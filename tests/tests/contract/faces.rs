@@ -135,8 +135,8 @@ fn check_warns_of_a_table_that_no_face_is_left_for() {
 #[test]
 fn check_lists_the_names_that_a_scene_may_use() {
     let place = Workplace::new();
-    // A face that is given twice counts once.
-    place.write("floor.obj", FLOOR.to_owned() + "usemtl ice\nf 1 2 7 6\n");
+    // A face without an area is left out.
+    place.write("floor.obj", FLOOR.to_owned() + "usemtl ice\nf 1 2 3\n");
     let said = place.run(["check", "floor.obj"]);
     assert!(
         said.out.contains("\nnames          cork (4), end (2), ice (2): of faces, for `[[entity.faces]]`\n"),

@@ -465,7 +465,7 @@ fn a_stack_that_slept_is_recorded_as_one_that_never_does() {
     }
 }
 
-/// As soft as fingers feel both, it sinks through; by mass it rests.
+/// As soft as fingers feel both, it sinks through; by mass it rests, and so does what says no stiffness.
 #[test]
 fn a_ball_of_steel_rests_on_a_thin_plate_where_contacts_are_stiff_and_check_tells_where_they_are_not() {
     let scene = "[[finger]]\n[[entity]]\nname = \"plate\"\nposition_m = [0, -0.005, 0]\n\
@@ -479,9 +479,18 @@ fn a_ball_of_steel_rests_on_a_thin_plate_where_contacts_are_stiff_and_check_tell
         place.run(["check", "scene.toml"]).out
     };
     let says = "ball sinks ";
-    assert!(rests_m(scene) < -1.0 && checked(scene).contains(says), "{}", checked(scene));
-    let stiff = format!("contact_stiffness = {{ kind = \"by-mass\" }}\n{scene}");
-    assert!(!checked(&stiff).contains(says), "{}", checked(&stiff));
-    let sunk_m = 0.04 - rests_m(&stiff);
-    assert!((sunk_m - G / 4e6).abs() < 1e-9, "{sunk_m}");
+    let of_kind = |kind: &str, scene: &str| format!("contact_stiffness = {{ kind = \"{kind}\" }}\n{scene}");
+    let said = format!("{scene}stiffness_n_per_m = 1000\n").replacen(
+        "position_m = [0, -0.005, 0]",
+        "position_m = [0, -0.005, 0]\nstiffness_n_per_m = 1000",
+        1,
+    );
+    for soft in [of_kind("as-felt", scene), said.clone()] {
+        assert!(rests_m(&soft) < -1.0 && checked(&soft).contains(says), "{}", checked(&soft));
+    }
+    for stiff in [scene.to_owned(), of_kind("by-mass", &said)] {
+        assert!(!checked(&stiff).contains(says), "{}", checked(&stiff));
+        let sunk_m = 0.04 - rests_m(&stiff);
+        assert!((sunk_m - G / 1e6).abs() < 1e-9, "{sunk_m}");
+    }
 }

@@ -408,7 +408,7 @@ fn a_disk_that_stalls_costs_rows_which_are_counted_and_never_the_run() {
     place.write("slow.mcap.copy.mcap", &written);
     let lines = |name: &str| said.out.lines().find(|line| line.contains(name)).unwrap_or_default().to_owned();
     let (slow, fast) = (lines("slow.mcap"), lines("fast.csv"));
-    assert!(slow.contains(" LOST: the disk was too slow") && !fast.contains("LOST"), "{}", said.out);
+    assert!(slow.contains(" LOST: its reader was too slow") && !fast.contains("LOST"), "{}", said.out);
     // The other recording has every row, so the loop gave them all.
     ran(&place, &["export", "slow.mcap.copy.mcap", "--csv", "left.csv"]);
     let (left, all) = (Table::read(&place.path("left.csv")), Table::read(&place.path("fast.csv")));

@@ -11,7 +11,7 @@ use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
 const BY_MASS: ContactStiffness = ContactStiffness::ByMass { damping_ratio: 1.0 };
 /// [rad/s]: as the heaviest body would swing.
-const OMEGA: f64 = 2000.0;
+const OMEGA: f64 = 1000.0;
 const RATES_HZ: [f64; 4] = [500.0, 1000.0, 4000.0, 8000.0];
 
 fn settings(contact_stiffness: ContactStiffness) -> Settings {
@@ -102,12 +102,12 @@ fn what_lands_comes_to_rest_without_a_swing() {
         for mass_kg in [0.01, 20.0] {
             let mut table = Table::new(vec![(ball(0.02, 0.021), mass_kg)], settings(BY_MASS), rate_hz);
             // It falls for 14.3 ms.
-            table.run(0.03);
+            table.run(0.045);
             let rest_m = 0.02 - G / OMEGA.powi(2);
             for _ in 0..100 {
                 table.run(1.0 / rate_hz);
                 let (at_m, speed_m_s) = (table.body(0).centre_W.y, table.body(0).velocity_W.y);
-                // exp(-2000 * 15.7 ms) of 0.14 m/s, and a tick's share; never above where it rests.
+                // exp(-1000 * 30.7 ms) of 0.14 m/s, and a tick's share; never above where it rests.
                 assert!(speed_m_s.abs() < 1e-6 && at_m < rest_m + 1e-9, "{rate_hz} {at_m} {speed_m_s}");
             }
         }
@@ -233,8 +233,8 @@ fn round_meshes_that_are_put_down_stand_upright_and_rest_within_a_second() {
             table.run(1.0);
             let (body, axis) = (table.body(0), table.entities[1].X_WB.rotation * Vector3::z());
             let leans = axis.y.abs().min(1.0).acos();
-            // It rests 0.6 um deep on four corners or more, 30 mm apart at least: by so much one may be deeper than another.
-            assert!(leans < 0.6e-6 / 0.03, "{sides}, {rate_hz} Hz, {lean}: {leans} rad");
+            // It rests 2.5 um deep on four corners or more, 30 mm apart at least: by so much one may be deeper than another.
+            assert!(leans < 2.5e-6 / 0.03, "{sides}, {rate_hz} Hz, {lean}: {leans} rad");
             assert!(body.velocity_W.norm() < 1e-6, "{sides}, {rate_hz} Hz, {lean}: {}", body.velocity_W);
         }
     }

@@ -91,12 +91,12 @@ fn what_has_bounced_comes_to_rest_on_its_spring() {
             for _ in 0..(3.0 * rate_hz) as u32 {
                 manipulation.step(&mut entities, &mut [], rate_hz.recip());
                 let now_m = energy_m(&manipulation.bodies()[0]);
-                // The spring's own energy is not in it: at rest it is as deep as 2.5 um.
-                assert!(now_m < was_m + 1e-9 || now_m < 1e-5, "{rate_hz} {restitution}: {was_m} {now_m}");
+                // The spring's own energy is not in it: at rest it is as deep as 10 um.
+                assert!(now_m < was_m + 1e-9 || now_m < 4e-5, "{rate_hz} {restitution}: {was_m} {now_m}");
                 was_m = now_m;
             }
             let depth_m = RADIUS_M - manipulation.bodies()[0].centre_W.y;
-            assert!((depth_m - G / 2000.0_f64.powi(2)).abs() < 1e-12, "{rate_hz} {restitution}: {depth_m}");
+            assert!((depth_m - G / 1000.0_f64.powi(2)).abs() < 1e-12, "{rate_hz} {restitution}: {depth_m}");
         }
     }
 }

@@ -184,7 +184,7 @@ fn a_contact_stiffness_that_is_none_or_does_not_fit_its_kind_is_refused() {
     for (stiffness, message) in [
         (
             "{ kind = \"hard\" }",
-            "s.toml:1: contact_stiffness.kind: unknown contact stiffness `hard`; allowed: by-mass, as-felt, given",
+            "s.toml:1: contact_stiffness.kind: unknown contact stiffness `hard`; allowed: as-said, by-mass, as-felt, given",
         ),
         (
             "{ kind = \"given\", stiffness_n_per_m = 0 }",
@@ -203,7 +203,8 @@ fn a_contact_stiffness_that_is_none_or_does_not_fit_its_kind_is_refused() {
     }
     let read =
         |stiffness: &str| Scene::parse(&scene(stiffness), Path::new("s.toml")).unwrap().dynamics.stiffness;
-    use world::ContactStiffnessSpec::{AsFelt, ByMass, Given};
+    use world::ContactStiffnessSpec::{AsFelt, AsSaid, ByMass, Given};
+    assert_eq!(read("{ kind = \"as-said\", damping_ratio = 0.5 }"), AsSaid { damping_ratio: 0.5 });
     assert_eq!(read("{ kind = \"as-felt\" }"), AsFelt);
     assert_eq!(read("{ kind = \"by-mass\", damping_ratio = 0.5 }"), ByMass { damping_ratio: 0.5 });
     let given = Given { stiffness_n_per_m: 2e4, damping_ratio: 1.0 };
