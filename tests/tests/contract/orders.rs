@@ -167,7 +167,7 @@ fn pairs_are_told_once_whichever_list_they_are_in_and_however_often_that_changes
          position_m = [0, 0.02, 0]\nmass_kg = 0.1\nstiffness_n_per_m = 500\ndamping_n_s_per_m = 5\n\
          friction = { model = \"coulomb\", mu = 0.4 }\ngrid = { count = [9, 1, 1], spacing_m = [0.1, 1, 1] }\n\
          [[entity]]\nname = \"drop\"\nshape = { kind = \"box\", size_m = [0.04, 0.04, 0.04] }\n\
-         position_m = [0.3, 0.3, 0.6]\nmass_kg = 0.1\nstiffness_n_per_m = 500\ndamping_n_s_per_m = 0.1\n\
+         position_m = [0.3, 0.3, 0.6]\nmass_kg = 0.1\nstiffness_n_per_m = 500\nrestitution = 0.6\n\
          friction = { model = \"coulomb\", mu = 0.4 }\n";
     let mut hand = String::from("t,f0_x,f0_y,f0_z\n");
     for step in 0..=20_u32 {
