@@ -188,6 +188,7 @@ mod tests {
         let both = [&soft, &hard].map(|entity| entity.clone().with_said_stiffness(true));
         near(as_said.between(&both[0], &both[1]), 375.0, constant(0.0));
         near(as_said.between(&both[0], &hard), 2e6, ratio(0.5));
+        near(as_said.between(&soft, &both[1]), 2e6, ratio(0.5));
         near(as_said.between(&both[0], &says(&both[1], 4e3)), 4e3, ratio(0.5));
         assert_eq!(as_said.response(&both[0], &both[1]), Response::Force);
         assert_eq!(as_said.response(&both[0], &hard), Response::Bounce { restitution: 0.0 });

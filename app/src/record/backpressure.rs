@@ -226,8 +226,9 @@ mod tests {
                 recorder.send(&Row { run_tick: tick, ..Row::empty() }, &[]);
             }
         }
+        let (handed_over, lost) = recorder.sent_and_lost();
+        assert!(lost > 0 && handed_over + lost == most, "{handed_over} {lost}");
         let recorded = recorder.finish();
-        assert!(recorded.lost > 0, "nobody reads");
         assert_eq!((recorded.unit, recorded.rows + recorded.lost), ("events", most));
         let line = recording_line(&recorded, 12);
         let told = format!(

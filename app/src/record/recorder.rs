@@ -388,7 +388,7 @@ impl Recorder {
     }
 
     /// How many of the unit were handed over, and how many found no room.
-    fn sent_and_lost(&self) -> (u64, u64) {
+    pub(super) fn sent_and_lost(&self) -> (u64, u64) {
         if self.is_of_events() {
             let [sent, lost] = [&self.shared.events_sent, &self.shared.events_lost];
             (sent.load(Ordering::Relaxed), lost.load(Ordering::Relaxed))
