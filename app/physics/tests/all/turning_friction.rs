@@ -242,5 +242,5 @@ fn piles_of_mixed_shapes_come_to_rest_within_five_seconds() {
         let fastest = speeds.fold(0.0, f64::max);
         assert!(fastest < 1e-4, "{count}: {fastest} m/s");
     }
-    assert!(asleep >= 3, "{asleep} of 4");
+    assert_eq!(asleep, 4);
 }
