@@ -199,8 +199,7 @@ fn a_box_does_not_know_of_it() {
     }
 }
 
-/// Things of all shapes are let fall into a box, in a heap: after five seconds all but one of the heaps are asleep, and in that one
-/// nothing moves so fast that anybody could see it.
+/// Things of all shapes are let fall into a box, in a heap.
 #[test]
 fn piles_of_mixed_shapes_come_to_rest_within_five_seconds() {
     const WALL_M: f64 = 0.12;
