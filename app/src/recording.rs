@@ -166,7 +166,7 @@ impl Recording {
         self.lines.is_as_before()
     }
 
-    /// Whose content the file has, to be looked at from another thread.
+    /// Content of the file, to be looked at from another thread.
     pub(crate) fn content(&self) -> Arc<ContentState> {
         self.lines.content()
     }

@@ -377,7 +377,7 @@ fn not_allowed(socket: &Path, request: &Request, answer: &Answer) -> AttachError
     }
 }
 
-/// Who has a right that this user, who asked, has not.
+/// Those with a right that this user, who asked, has not, in words.
 fn allowed_in_words(group: Option<u32>, user: u32) -> String {
     const OWNERS: &str = "root and the user that the driver runs as";
     match group {

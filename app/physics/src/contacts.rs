@@ -85,7 +85,7 @@ impl Contacts {
         Self { response, springs_only: false, own, follows_said }
     }
 
-    /// What counts between two entities that say no stiffness of contacts.
+    /// Stiffness and damping ratio between two entities, unless that is as felt.
     fn own(&self, a: &Entity, b: &Entity) -> Option<(f64, f64)> {
         let says_another = [a, b].iter().any(|entity| entity.contact_stiffness_n_per_m.is_some());
         let is_as_felt = self.follows_said && a.is_stiffness_said && b.is_stiffness_said && !says_another;

@@ -16,7 +16,7 @@
 //! Units: shares of `F` and of `T`, 1 each alone.
 //! Invariant: shares are on the ellipse, or 1 where nothing slips.
 
-/// How a pad that bears a force and a torque slips.
+/// Law by which a pad that bears a force and a torque slips.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum LimitSurface {
     /// As real pads: together they bear less of each.
@@ -26,7 +26,7 @@ pub enum LimitSurface {
     Uncoupled,
 }
 
-/// What a pad bears at most, or is asked for, or how it slips.
+/// Shares that a pad bears at most, or is asked for; or its slip.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub(crate) struct Shares {
     pub(crate) friction: f64,
@@ -53,7 +53,7 @@ pub(crate) struct Slip {
 }
 
 impl Slip {
-    /// What a pad bears at most that is asked for so much, both not negative, and has slid by so much since the last tick (m,
+    /// Most that a pad bears that is asked for so much, both not negative, and has slid by so much since the last tick (m,
     /// and rad times `T / F`).
     pub(crate) fn shares(&mut self, asked: &Shares, slid_m: &Shares) -> Shares {
         let size = asked.size();

@@ -29,7 +29,7 @@ pub enum TorsionModel {
     Coulomb {
         /// Radius of the pressed pad \[m\].
         pad_radius_m: f64,
-        /// What it bears of that while it is pulled along, and along while it is turned.
+        /// Part that it bears of that while it is pulled along, and along while it is turned.
         limit_surface: LimitSurface,
     },
     /// The torque of gravity about the grasp axis counts less by the share `A / critical` (Melder eq. 5.16), and turning is
@@ -179,7 +179,7 @@ impl SoftFinger {
         }
     }
 
-    /// Whether friction and torsion of a touch share what it can bear.
+    /// True if friction and torsion of a touch share what it can bear.
     pub(crate) fn shares(&self) -> bool {
         matches!(self.model, TorsionModel::Coulomb { limit_surface: LimitSurface::Ellipse, .. })
     }

@@ -54,7 +54,7 @@ impl EventsFile {
         self.lines.rows().saturating_sub(self.losses)
     }
 
-    /// Whose content the file has, to be looked at from another thread.
+    /// Content of the file, to be looked at from another thread.
     pub(super) fn content(&self) -> Arc<ContentState> {
         self.lines.content()
     }

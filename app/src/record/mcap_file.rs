@@ -184,7 +184,7 @@ impl McapFile {
         self.rows
     }
 
-    /// Whose content the file has, to be looked at from another thread.
+    /// Content of the file, to be looked at from another thread.
     pub(super) fn content(&self) -> Arc<ContentState> {
         Arc::clone(&self.content)
     }

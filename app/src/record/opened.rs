@@ -46,7 +46,7 @@ pub struct Opened {
     content: Arc<ContentState>,
 }
 
-/// Whose content a file has.
+/// Content of a file.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Content {
     /// The earlier one.
@@ -217,7 +217,7 @@ impl Opened {
         }
     }
 
-    /// What was reserved behind the content, which was changed then, belongs to others again. What others have changed since stays
+    /// Room that was reserved behind the content, which was changed then, belongs to others again. What others have changed since stays
     /// changed; of a file of another user the time of the reserving stays.
     fn give_room_back(&self, [before, reserved]: [SystemTime; 2]) -> io::Result<()> {
         let found = self.file.metadata()?;
@@ -264,7 +264,7 @@ impl Opened {
         }
     }
 
-    /// Whose content it has, to be looked at from another thread.
+    /// Its content, to be looked at from another thread.
     pub(super) fn content(&self) -> Arc<ContentState> {
         Arc::clone(&self.content)
     }

@@ -39,7 +39,7 @@ impl RecordFile {
         }
     }
 
-    /// Whose content the file has, to be looked at from another thread.
+    /// Content of the file, to be looked at from another thread.
     pub(super) fn content(&self) -> Arc<ContentState> {
         match self {
             Self::Csv(file) => file.content(),

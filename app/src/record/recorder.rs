@@ -65,7 +65,7 @@ impl Recorded {
         Self { path, rows: 0, unit: "rows", lost: 0, is_left_behind: false, failure, is_as_before: false }
     }
 
-    /// How many of its unit are missing, of a run that could not hand on so many rows.
+    /// Number of its unit that are missing, of a run that could not hand on so many rows.
     pub fn missing(&self, rows_lost: u64) -> u64 {
         if self.unit == EVENTS { self.lost } else { self.lost + rows_lost }
     }
@@ -387,7 +387,7 @@ impl Recorder {
         Recorded { path, rows, unit, lost, is_left_behind: false, failure, is_as_before }
     }
 
-    /// How many of the unit were handed over, and how many found no room.
+    /// Numbers of the unit that were handed over, and that found no room.
     pub(super) fn sent_and_lost(&self) -> (u64, u64) {
         if self.is_of_events() {
             let [sent, lost] = [&self.shared.events_sent, &self.shared.events_lost];

@@ -116,7 +116,7 @@ impl WholeLines {
         written
     }
 
-    /// Whose content it has, to be looked at from another thread.
+    /// Its content, to be looked at from another thread.
     pub(crate) fn content(&self) -> Arc<ContentState> {
         self.file.content()
     }

@@ -28,7 +28,7 @@ pub enum SoftModelSpec {
     Coulomb {
         /// Of the pressed pad (m).
         pad_radius_m: Option<f64>,
-        /// Whether it bears friction and torsion in full at once, as the thesis has it.
+        /// True if it bears friction and torsion in full at once, as the thesis has it.
         is_uncoupled: bool,
     },
     /// As Melder's eq. 5.16 has it.

@@ -63,7 +63,7 @@ impl Patches {
         self.all[1..].iter().any(|patch| patch.is_known)
     }
 
-    /// Whether any place is pressed.
+    /// True if any place is pressed.
     pub(super) fn are_pressed(&self) -> bool {
         self.all.iter().any(Patch::is_pressed)
     }

@@ -189,7 +189,7 @@ impl Equations<'_> {
         }
     }
 
-    /// What presses at a link, as far as friction knows \[N\].
+    /// Force that presses at a link, as far as friction knows \[N\].
     #[inline]
     pub(super) fn presses_n(&self, link: usize, row: &Row, velocity_W: &Vector3<f64>) -> f64 {
         match self.holds_n {

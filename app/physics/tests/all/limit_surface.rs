@@ -18,7 +18,7 @@ fn pads(limit_surface: LimitSurface) -> SoftFinger {
     SoftFinger::default().with_model(TorsionModel::Coulomb { pad_radius_m: PAD_RADIUS_M, limit_surface })
 }
 
-/// What each of two fingers must press with to bear the cube this far beside its centre (N): of friction, and of torsion.
+/// Forces with which each of two fingers must press to bear the cube this far beside its centre (N): for friction, and for torsion.
 fn alone_n(arm: f64) -> [f64; 2] {
     let friction_n = MASS * G / (2.0 * MU);
     [friction_n, friction_n * arm / (2.0 / 3.0 * PAD_RADIUS_M)]
@@ -68,7 +68,7 @@ fn a_cube_beside_its_centre_slips_where_the_ellipse_says_at_any_rate() {
     }
 }
 
-/// What spins between two pads sinks by more than their springs give, though they hold it at rest.
+/// A thing that spins between two pads sinks by more than their springs give, though they hold it at rest.
 #[test]
 fn a_pad_that_turns_has_less_friction_left() {
     for rate_hz in [500.0_f64, 1000.0, 4000.0] {

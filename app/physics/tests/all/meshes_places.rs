@@ -378,7 +378,7 @@ fn a_peg_thrown_about_in_many_ways_gains_no_energy() {
     throw_pegs(&[(-0.07, -1.0), (0.2, 0.0), (0.05, 5.0), (-0.15, 2.0)]);
 }
 
-/// What does not move touches in every tick if it does in any: the plane of the last tick's points
+/// A thing that does not move touches in every tick if it does in any: the plane of the last tick's points
 /// may show none of them.
 #[test]
 fn what_stands_still_does_not_touch_in_every_other_tick_only() {
