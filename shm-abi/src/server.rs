@@ -551,8 +551,8 @@ impl Server {
         }
     }
 
-    /// Takes a lease that is not in force back for this newcomer, from one who had time to map its memory, or whose user has let an
-    /// offer lapse shortly before; for an administrator at once.
+    /// Takes a lease that is not in force back for this newcomer, from one who had time to map its memory, or whose user has let
+    /// an offer lapse shortly before; for an administrator at once.
     fn displace_idle_offer(&mut self, newcomer: usize) {
         let asks = self.connections[newcomer].owner().user;
         let Some((holder, connection)) = self.holder() else { return };

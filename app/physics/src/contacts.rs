@@ -2,10 +2,11 @@
 //!
 //! Problem: what fingers feel is soft, for a hand stands a few newtons per millimetre at best. On a shelf of that stiffness a
 //! ball of steel sinks out of sight.
-//! Model: contacts between entities are as felt (Melder ch. 6.2.2.2), one surface behind the other, with both dampers, where both
-//! say how stiff they are; or they have a stiffness of their own, by mass `k = m (1000 / s)^2` of each point, with m the mass of the heaviest body: on a single
-//! point that rests 10 um deep, whatever the rate, and what carries forty of its like 0.4 mm. Then they have a damper of their
-//! own, a share of the critical one of what gives way at the point: nothing swings, whatever it weighs. An entity may say another stiffness; two that do are one spring behind the other.
+//! Model: contacts between entities are as felt (Melder ch. 6.2.2.2), one surface behind the other, with both dampers, where
+//! both say how stiff they are; or they have a stiffness of their own, by mass `k = m (1000 / s)^2` of each point, with m the
+//! mass of the heaviest body: on a single point that rests 10 um deep, whatever the rate, and what carries forty of its like
+//! 0.4 mm. Then they have a damper of their own, a share of the critical one of what gives way at the point: nothing swings,
+//! whatever it weighs. An entity may say another stiffness; two that do are one spring behind the other.
 //! Since forces are those of the end of the tick, no stiffness is too large for a light body. Of integrators that take
 //! those of its beginning this is not so: there contacts are as felt.
 //! Limits: of a pile of mixed shapes that is stirred the solver takes several times as many rounds where contacts are by mass, and

@@ -217,8 +217,8 @@ impl Opened {
         }
     }
 
-    /// Room that was reserved behind the content, which was changed then, belongs to others again. What others have changed since stays
-    /// changed; of a file of another user the time of the reserving stays.
+    /// Gives the room to others again that was reserved behind the content, which was changed then. What others have changed since
+    /// stays changed; of a file of another user the time of the reserving stays.
     fn give_room_back(&self, [before, reserved]: [SystemTime; 2]) -> io::Result<()> {
         let found = self.file.metadata()?;
         self.file.set_len(found.len())?;
@@ -308,8 +308,8 @@ impl Opened {
         (&self.file).rewind()
     }
 
-    /// Finds out whether a piece can be written over the content, and that back, where room that is reserved is no promise: on file
-    /// systems that copy what is written over, or that reserve none.
+    /// Finds out whether a piece can be written over the content, and that back, where room that is reserved is no promise: on
+    /// file systems that copy what is written over, or that reserve none.
     fn try_room(&self, piece: &[u8], replaced: &[u8]) -> io::Result<()> {
         // What a file system takes for the first byte alone, which is written once more.
         let block = vec![HALF_REPLACED; BLOCK_BYTES];

@@ -67,8 +67,8 @@ pub(super) fn open(
     if has_switch(device, config) && !opened.extras().buttons {
         return Err(OpenError::NobodyPresses { device: device.name.clone() });
     }
-    // In lockstep the driver's idle ticks go by a clock that nobody can repeat. On a virtual clock there is none, and the first tick,
-    // in which nothing is written yet, shall be the same.
+    // In lockstep the driver's idle ticks go by a clock that nobody can repeat. On a virtual clock there is none, and the first
+    // tick, in which nothing is written yet, shall be the same.
     let opened = match config.clock {
         ClockMode::Lockstep | ClockMode::Virtual => opened.waiting_for_a_commander(),
         ClockMode::Real => opened,

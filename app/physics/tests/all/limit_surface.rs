@@ -18,7 +18,8 @@ fn pads(limit_surface: LimitSurface) -> SoftFinger {
     SoftFinger::default().with_model(TorsionModel::Coulomb { pad_radius_m: PAD_RADIUS_M, limit_surface })
 }
 
-/// Forces with which each of two fingers must press to bear the cube this far beside its centre (N): for friction, and for torsion.
+/// Forces with which each of two fingers must press to bear the cube this far beside its centre (N): for friction, and for
+/// torsion.
 fn alone_n(arm: f64) -> [f64; 2] {
     let friction_n = MASS * G / (2.0 * MU);
     [friction_n, friction_n * arm / (2.0 / 3.0 * PAD_RADIUS_M)]
