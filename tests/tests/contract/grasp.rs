@@ -81,6 +81,10 @@ fn pads_hold_what_points_let_swing() {
     let held = most("soft = true");
     assert!(held < 0.03, "pads: {held}");
     assert_eq!(most("soft = { model = \"none\" }"), most(""));
+    // 2 N on each pad: 0.41 of what friction bears, and 0.96 of what torsion does, which both bear alone.
+    let small = |surface: &str| most(&format!("soft = {{ pad_radius_m = 0.0032{surface} }}"));
+    let [shared, alone] = ["", ", limit_surface = \"uncoupled\""].map(small);
+    assert!(shared > 0.15 && alone < 0.03, "{shared} {alone}");
     // The thesis' model, with an area that the circle of this grip exceeds: nothing turns; and with one that it does not.
     let viscous = |area: f64| most(&format!("soft = {{ model = \"viscous\", critical_area_m2 = {area:?} }}"));
     assert!(viscous(1e-7) < 0.03, "{}", viscous(1e-7));
@@ -160,6 +164,8 @@ fn fingers_that_cannot_be_are_refused_with_line_and_key() {
         ("soft = { model = \"sticky\" }", "coulomb, viscous, stick-slip, none"),
         ("soft = { model = \"viscous\", pad_radius_m = 0.01 }", "unknown key"),
         ("soft = { pad_radius_m = 0 }", "a number above 0"),
+        ("soft = { limit_surface = \"round\" }", "unknown limit surface `round`; allowed: ellipse, uncoupled"),
+        ("soft = { model = \"viscous\", limit_surface = \"ellipse\" }", "unknown key"),
         (
             "soft = { model = \"stick-slip\", critical_area_at_rest_m2 = 1e-6, critical_area_turning_m2 = 2e-6 }",
             "critical_area_turning_m2 is 0.000002",
