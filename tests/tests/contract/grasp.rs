@@ -164,7 +164,10 @@ fn fingers_that_cannot_be_are_refused_with_line_and_key() {
         ("soft = { model = \"sticky\" }", "coulomb, viscous, stick-slip, none"),
         ("soft = { model = \"viscous\", pad_radius_m = 0.01 }", "unknown key"),
         ("soft = { pad_radius_m = 0 }", "a number above 0"),
-        ("soft = { limit_surface = \"round\" }", "unknown limit surface `round`; allowed: ellipse, uncoupled"),
+        (
+            "soft = { limit_surface = \"round\" }",
+            "unknown limit surface `round`; allowed: ellipse, uncoupled",
+        ),
         ("soft = { model = \"viscous\", limit_surface = \"ellipse\" }", "unknown key"),
         (
             "soft = { model = \"stick-slip\", critical_area_at_rest_m2 = 1e-6, critical_area_turning_m2 = 2e-6 }",
