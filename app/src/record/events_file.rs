@@ -1,8 +1,9 @@
 //! What happened in a run, and nothing else: a line for each event.
 
+use super::content::ContentState;
 use super::destination::{EventFormat, shown};
 use super::event_line::{KEYS, csv, json, said};
-use super::opened::{ContentState, Opened};
+use super::opened::Opened;
 use super::whole_lines::WholeLines;
 use crate::book::Book;
 use crate::columns::Names;

@@ -15,10 +15,11 @@
 //! Invariant: what could not be written as a whole is cut off again; after that nothing more is written, not even an end.
 
 use super::about::{self, About};
+use super::content::ContentState;
 use super::destination::shown;
 use super::event_line::{holders, name, said};
 use super::foxglove;
-use super::opened::{ContentState, Opened};
+use super::opened::Opened;
 use super::schema::{self, event, order};
 use super::tick;
 use super::view::View;

@@ -9,6 +9,7 @@
 
 mod about;
 pub(crate) mod backpressure;
+mod content;
 mod descriptor;
 pub mod destination;
 mod event_line;
@@ -28,10 +29,10 @@ mod wire;
 
 pub use about::{About, Beginning, InputFile};
 pub use backpressure::Backpressure;
+pub(crate) use content::ContentState;
 pub use events_file::EventsFile;
 pub use files::Files;
 pub use mcap_file::McapFile;
-pub(crate) use opened::ContentState;
 pub use opened::{Opened, begin_all};
 pub use record_file::RecordFile;
 pub use recorder::{EventFeed, Recorded, Recorder};

@@ -13,6 +13,7 @@
 //! begins at once.
 //! Invariant: what was opened and not started is as it was: a file that was made here is removed again.
 
+use super::content::{Content, ContentState};
 use super::destination::{is_standard_output, shown};
 use crate::recording::RecordingError;
 use rt_core::{limits, output_file};
@@ -25,7 +26,6 @@ use std::io::{self, Read, Seek, Write};
 use std::os::fd::{AsFd, AsRawFd};
 use std::os::unix::fs::{FileExt, FileTypeExt, MetadataExt};
 use std::path::{Path, PathBuf};
-use std::sync::atomic::{AtomicU8, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::SystemTime;
 
@@ -44,40 +44,6 @@ pub struct Opened {
     /// Last change of the content before room was reserved behind it, if some was, and that by the reserving.
     changed: Cell<Option<[SystemTime; 2]>>,
     content: Arc<ContentState>,
-}
-
-/// Content of a file.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Content {
-    /// The earlier one.
-    Earlier,
-    /// Some of the earlier one, perhaps.
-    BeingReplaced,
-    /// Its own.
-    Replaced,
-    /// None.
-    Lost,
-}
-
-/// [`Content`], as several threads see it.
-#[derive(Debug)]
-pub(crate) struct ContentState(AtomicU8);
-
-impl ContentState {
-    const ALL: [Content; 4] = [Content::Earlier, Content::BeingReplaced, Content::Replaced, Content::Lost];
-
-    fn new(content: Content) -> Self {
-        Self(AtomicU8::new(content as u8))
-    }
-
-    fn store(&self, content: Content) {
-        self.0.store(content as u8, Ordering::Relaxed);
-    }
-
-    /// As it is now.
-    pub(crate) fn load(&self) -> Content {
-        Self::ALL[usize::from(self.0.load(Ordering::Relaxed)) % Self::ALL.len()]
-    }
 }
 
 /// Held while the content of a file is replaced.

@@ -2,9 +2,9 @@
 //!
 //! [`Opened::start`]: super::Opened
 
+use super::content::ContentState;
 use super::events_file::EventsFile;
 use super::mcap_file::McapFile;
-use super::opened::ContentState;
 use crate::recording::{Recording, RecordingError};
 use crate::row::{BodyRow, Row};
 use std::sync::Arc;

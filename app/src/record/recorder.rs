@@ -9,8 +9,8 @@
 //! Invariant: on a clock that waits, a recording that lacks a row lacks all behind it, and says so.
 
 use super::backpressure::{Backpressure, Progress, Wait};
+use super::content::{Content, ContentState};
 use super::destination::shown;
-use super::opened::{Content, ContentState};
 use super::record_file::RecordFile;
 use crate::fast_loop::WhenFull;
 use crate::progress::{SOON, StatusLine};

@@ -6,7 +6,8 @@
 //! Invariants: whatever goes wrong, a file ends with a complete line: a write that failed half way (a full disk) is cut
 //! back to the last line that fits. Only lines that are in the file count.
 
-use super::opened::{ContentState, Opened};
+use super::content::ContentState;
+use super::opened::Opened;
 use rt_core::output_file;
 use std::io::{self, Seek, SeekFrom, Write};
 use std::sync::Arc;
