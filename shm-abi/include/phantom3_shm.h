@@ -647,8 +647,12 @@ typedef struct PhantomAnswer {
   // Since 1.3. With [`Verdict::NotAllowed`]: the number of the group whose members may, plus one; 0: only root
   // and the user that the driver runs as.
   uint64_t allowed_group_plus_one;
+  // Since 1.3. To an emergency stop: tick of the newest frame, plus one; 0: not told, or there is none.
+  uint64_t latest_tick_plus_one;
+  // Since 1.3. 1: that frame shows an emergency stop, and no force of any device.
+  uint64_t latest_is_stopped;
   // Zero.
-  uint64_t reserved[6];
+  uint64_t reserved[4];
 } PhantomAnswer;
 
 // Hash of every type, name, size and offset of the contract; both sides must agree on it.
@@ -840,6 +844,8 @@ PHANTOM_ASSERT(offsetof(PhantomAnswer, driver_pid) == 56);
 PHANTOM_ASSERT(offsetof(PhantomAnswer, holder_pid) == 64);
 PHANTOM_ASSERT(offsetof(PhantomAnswer, holder_name) == 72);
 PHANTOM_ASSERT(offsetof(PhantomAnswer, allowed_group_plus_one) == 136);
-PHANTOM_ASSERT(offsetof(PhantomAnswer, reserved) == 144);
+PHANTOM_ASSERT(offsetof(PhantomAnswer, latest_tick_plus_one) == 144);
+PHANTOM_ASSERT(offsetof(PhantomAnswer, latest_is_stopped) == 152);
+PHANTOM_ASSERT(offsetof(PhantomAnswer, reserved) == 160);
 
 #endif  /* PHANTOM3_SHM_H */

@@ -238,12 +238,14 @@ pub fn clear_fault_as_of(asked_ns: u64, socket: &Path, name: &str) -> Result<(),
 /// # Errors
 /// Why it could be asked in neither way.
 pub fn emergency_stop(socket: &Path, name: &str) -> Result<(), AttachError> {
-    stop_socket::send(socket).or_else(|_| emergency_stop_over_connection(socket, name))
+    stop_socket::send(socket).or_else(|_| emergency_stop_over_connection(socket, name).map(|_| ()))
 }
 
-/// The same over a connection alone, whose answer says that the driver has heard it.
-pub fn emergency_stop_over_connection(socket: &Path, name: &str) -> Result<(), AttachError> {
-    exchange(socket, &Request::new(RequestKind::EmergencyStop, name)).map(|_| ())
+/// The same over a connection alone. The answer says that the driver has heard it, and, of a driver that tells, the tick
+/// of its newest frame and whether that shows an emergency stop and no force ([`Answer::latest`]): whoever finds no place to
+/// look from asks again until a later frame does.
+pub fn emergency_stop_over_connection(socket: &Path, name: &str) -> Result<Answer, AttachError> {
+    exchange(socket, &Request::new(RequestKind::EmergencyStop, name)).map(|(answer, ..)| answer)
 }
 
 /// Tells the driver that devices lie in their home pose now: bit `i` of `devices` means device `i`, 0 all of

@@ -287,6 +287,13 @@ impl Frame {
         let count = usize::try_from(self.device_count).unwrap_or(MAX_DEVICES).min(MAX_DEVICES);
         &self.devices[..count]
     }
+
+    /// It is of an emergency stop that stands, and no device was given a force.
+    pub fn shows_emergency_stop(&self) -> bool {
+        self.state == DriverState::Fault as u64
+            && self.fault == FaultReason::EmergencyStop as u64
+            && self.present_devices().iter().all(|device| device.force_on_user_n_applied == [0.0; 3])
+    }
 }
 
 #[cfg(test)]

@@ -6,6 +6,7 @@
 //! Afterwards the connection carries nothing: a lease lasts as long as it stays open.
 
 use crate::enumeration::from_word;
+use crate::frame::Frame;
 use crate::layout::{
     ABI_MAJOR, ABI_MINOR, ABI_VERSION, CommanderSegment, DriverSegment, LAYOUT_HASH, MAGIC, NAME_BYTES,
     assert_layout,
@@ -74,8 +75,12 @@ pub struct Answer {
     /// Since 1.3. With [`Verdict::NotAllowed`]: the number of the group whose members may, plus one; 0: only root
     /// and the user that the driver runs as.
     pub allowed_group_plus_one: u64,
+    /// Since 1.3. To an emergency stop: tick of the newest frame, plus one; 0: not told, or there is none.
+    pub latest_tick_plus_one: u64,
+    /// Since 1.3. 1: that frame shows an emergency stop, and no force of any device.
+    pub latest_is_stopped: u64,
     /// Zero.
-    pub reserved: [u64; 6],
+    pub reserved: [u64; 4],
 }
 
 assert_layout!(Answer: 192, 8 {
@@ -91,7 +96,9 @@ assert_layout!(Answer: 192, 8 {
     holder_name: [u8; NAME_BYTES] = 72,
     reserved: [u64; 7] = 136 => {
         allowed_group_plus_one: u64 = 136,
-        reserved: [u64; 6] = 144,
+        latest_tick_plus_one: u64 = 144,
+        latest_is_stopped: u64 = 152,
+        reserved: [u64; 4] = 160,
     },
 });
 
@@ -225,6 +232,22 @@ impl Answer {
     pub fn not_allowed(group: Option<u32>) -> Self {
         let allowed_group_plus_one = group.map_or(0, |group| u64::from(group) + 1);
         Self { allowed_group_plus_one, ..Self::new(Verdict::NotAllowed) }
+    }
+
+    /// That an emergency stop is passed on, and what the newest frame shows.
+    pub fn to_emergency_stop(latest: Option<&Frame>) -> Self {
+        let tick = latest.and_then(|frame| frame.tick.checked_add(1));
+        let is_stopped = latest.is_some_and(Frame::shows_emergency_stop);
+        Self {
+            latest_tick_plus_one: tick.unwrap_or(0),
+            latest_is_stopped: is_stopped.into(),
+            ..Self::new(Verdict::Granted)
+        }
+    }
+
+    /// Tick of the newest frame, if it is told, and whether that shows an emergency stop and no force.
+    pub fn latest(&self) -> Option<(u64, bool)> {
+        Some((self.latest_tick_plus_one.checked_sub(1)?, self.latest_is_stopped == 1))
     }
 
     /// The group whose members may what was asked for; `None`: only root and the driver's own user.

@@ -370,7 +370,11 @@ impl Server {
                 self.pass_on(index, ServerEvent::ClearFaultRequested { user, is_administrator, asked_ns }, to)
             }
             RequestKind::EmergencyStop => {
-                self.pass_on(index, ServerEvent::EmergencyStopRequested { pid, user, asked_ns }, to)
+                match to.take(ServerEvent::EmergencyStopRequested { pid, user, asked_ns }) {
+                    // Whoever finds no place to look from sees in the answers what becomes of it.
+                    Ok(()) => self.part(index, &Answer::to_emergency_stop(memory.read_latest().as_ref())),
+                    Err(verdict) => self.refuse(index, verdict),
+                }
             }
             RequestKind::Zero => self.pass_on(
                 index,
@@ -396,15 +400,18 @@ impl Server {
     /// Done first, answered then: whatever becomes of the answer, it is done.
     fn pass_on(&self, index: usize, event: ServerEvent, to: &mut impl Recipient) -> Stage {
         match to.take(event) {
-            Ok(()) => {
-                let _ = self.answer(index, &Answer::new(Verdict::Granted), &[]);
-            }
+            Ok(()) => self.part(index, &Answer::new(Verdict::Granted)),
             Err(Verdict::NotAllowed) => {
                 let group = self.check(index, Right::Administer).err().flatten();
-                return self.deny(index, group);
+                self.deny(index, group)
             }
-            Err(verdict) => return self.refuse(index, verdict),
+            Err(verdict) => self.refuse(index, verdict),
         }
+    }
+
+    /// Answers one who has nothing to keep.
+    fn part(&self, index: usize, answer: &Answer) -> Stage {
+        let _ = self.answer(index, answer, &[]);
         Stage::Gone
     }
 
@@ -521,13 +528,11 @@ impl Server {
                 Ok(()) => self.hang_up(holder, to),
             }
         }
-        let _ = self.answer(index, &Answer::new(Verdict::Granted), &[]);
-        Stage::Gone
+        self.part(index, &Answer::new(Verdict::Granted))
     }
 
     fn deny(&self, index: usize, group: Option<u32>) -> Stage {
-        let _ = self.answer(index, &Answer::not_allowed(group), &[]);
-        Stage::Gone
+        self.part(index, &Answer::not_allowed(group))
     }
 
     fn refuse(&self, index: usize, verdict: Verdict) -> Stage {
@@ -538,8 +543,7 @@ impl Server {
             answer.holder_pid = holder.peer.pid.into();
             answer.holder_name = handshake::name_bytes(name);
         }
-        let _ = self.answer(index, &answer, &[]);
-        Stage::Gone
+        self.part(index, &answer)
     }
 
     /// Between two looks at all connections a holder may have died and its successor asked already: the

@@ -149,7 +149,9 @@ fn answer(minor: u32) -> Answer {
         holder_pid: count(9),
         holder_name: name_bytes(NAME),
         allowed_group_plus_one: if minor >= 3 { count(18) } else { 0 },
-        reserved: [0; 6],
+        latest_tick_plus_one: if minor >= 3 { count(19) } else { 0 },
+        latest_is_stopped: if minor >= 3 { count(20) } else { 0 },
+        reserved: [0; 4],
     }
 }
 

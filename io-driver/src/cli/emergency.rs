@@ -3,7 +3,8 @@
 //! Model: asked in every way there is, at every place where a driver may be, then believed only when seen. The stop goes
 //! by datagram first, which never waits and needs no thread, then over a connection. It is done when a new frame shows
 //! the fault and no force in any device; in lockstep, where the loop may wait for its commander and tell no new frame,
-//! when the driver has heard it and the frame that stands shows that.
+//! when the driver has heard it and the frame that stands shows that. Who finds no place to look from asks again: the answer
+//! to an emergency stop tells what the newest frame shows.
 //! Invariants: no exit status of 0 without that sight from every driver that was asked. Asking comes before any word.
 //! Asking over a connection and looking have threads of their own: neither a driver that does not answer nor one without
 //! a free place delays the words that motors may still be on.
@@ -15,7 +16,7 @@ use crate::print::print_outcome;
 use crate::say::say;
 use shm_abi::client::{self, AttachError};
 use shm_abi::segment::ClockMode;
-use shm_abi::{DriverState, DriverView, FaultReason, Frame, stop_socket};
+use shm_abi::{DriverView, Frame, stop_socket};
 use std::path::Path;
 use std::process::ExitCode;
 use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
@@ -102,7 +103,7 @@ fn start_threads(socket: &Path, sent: bool, begun: Instant, teller: &Teller) -> 
 /// Over a connection; an error if nobody can have heard it by datagram either.
 fn ask(socket: &Path, sent: bool, heard: &Heard) -> Result<(), AttachError> {
     match client::emergency_stop_over_connection(socket, NAME) {
-        Ok(()) => {
+        Ok(_) => {
             let _ = heard.set(Instant::now());
             Ok(())
         }
@@ -197,19 +198,23 @@ fn print_shown(sight: Sight, place: &str) {
 
 /// The frame that shows that the motors are off; `None`: the driver is gone, or no frame shows that in time.
 fn wait_for_zero(socket: &Path, heard: &Heard, until: Instant) -> Option<Sight> {
+    let mut first_told = None;
     let attachment = loop {
         match client::observe(socket, NAME) {
             Ok(attachment) => break attachment,
             Err(AttachError::NoDriver { .. } | AttachError::DriverGone { .. }) => return None,
             Err(_) if Instant::now() > until => return None,
-            Err(_) => std::thread::sleep(RETRY),
+            Err(_) => match ask_what_it_shows(socket, &mut first_told) {
+                Some(tick) => return Some(Sight::New(tick)),
+                None => std::thread::sleep(RETRY),
+            },
         }
     };
     let driver = &attachment.driver;
     // What stands there already may be old, and the loop dead.
     let stale = driver.latest_tick();
     loop {
-        match driver.read_latest().filter(is_stopped) {
+        match driver.read_latest().filter(Frame::shows_emergency_stop) {
             Some(frame) if Some(frame.tick) > stale => return Some(Sight::New(frame.tick)),
             Some(frame) if may_stand(driver, heard) => return Some(Sight::Stands(frame.tick)),
             _ if !attachment.connection.is_open() || Instant::now() > until => return None,
@@ -218,15 +223,17 @@ fn wait_for_zero(socket: &Path, heard: &Heard, until: Instant) -> Option<Sight> 
     }
 }
 
+/// Stops the motors once more, for the sake of the answer. Tick of the frame that shows that they are off, if it is later
+/// than that of the first answer.
+fn ask_what_it_shows(socket: &Path, first_told: &mut Option<u64>) -> Option<u64> {
+    let (tick, is_stopped) = client::emergency_stop_over_connection(socket, NAME).ok()?.latest()?;
+    let first = *first_told.get_or_insert(tick);
+    (is_stopped && tick > first).then_some(tick)
+}
+
 /// An earlier frame may tell how things stand: in lockstep no motor is written between one frame and the next
 /// but with the reply to it, and what was heard is collected meanwhile. There is no card that runs in lockstep.
 fn may_stand(driver: &DriverView, heard: &Heard) -> bool {
     driver.info().clock_mode == ClockMode::Lockstep
         && heard.get().is_some_and(|heard| heard.elapsed() > STANDS)
-}
-
-fn is_stopped(frame: &Frame) -> bool {
-    frame.state == DriverState::Fault as u64
-        && frame.fault == FaultReason::EmergencyStop as u64
-        && frame.present_devices().iter().all(|device| device.force_on_user_n_applied == [0.0; 3])
 }

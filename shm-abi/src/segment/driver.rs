@@ -101,6 +101,11 @@ impl DriverMemory {
         }
     }
 
+    /// Reads the newest frame, as [`DriverView::read_latest`] does.
+    pub fn read_latest(&self) -> Option<Frame> {
+        read_latest(&self.map, self.frame_words)
+    }
+
     /// The descriptor to hand over.
     pub fn fd(&self) -> BorrowedFd<'_> {
         self.fd.as_fd()
@@ -112,6 +117,39 @@ impl Deref for DriverMemory {
     fn deref(&self) -> &DriverSegment {
         &self.map
     }
+}
+
+/// Reads the first words of frame `tick`; the others are zero.
+#[inline]
+fn read_frame(
+    segment: &DriverSegment,
+    frame_words: usize,
+    tick: u64,
+    frame: &mut Frame,
+) -> Result<(), FrameUnavailable> {
+    let slot = &segment.frames[slot_of(tick, RING_FRAMES)];
+    let (used, beyond) = words_of_mut(frame).split_at_mut(frame_words);
+    beyond.fill(0);
+    let stamp = seqlock::read(&slot.sequence, &slot.words[..used.len()], used)
+        .map_err(|Torn| FrameUnavailable::Torn(tick))?;
+    match stamp.cmp(&seqlock::stamp(tick)) {
+        std::cmp::Ordering::Equal => Ok(()),
+        std::cmp::Ordering::Less => Err(FrameUnavailable::NotYet(tick)),
+        std::cmp::Ordering::Greater => Err(FrameUnavailable::Overwritten(tick)),
+    }
+}
+
+/// The newest frame. `None`: there is none, or a few tries in a row were overtaken.
+fn read_latest(segment: &DriverSegment, frame_words: usize) -> Option<Frame> {
+    const TRIES: usize = 8;
+    let mut frame = Frame::zeroed();
+    for _ in 0..TRIES {
+        let tick = doorbell::latest(&segment.bell).filter(|tick| *tick <= LAST_TICK)?;
+        if read_frame(segment, frame_words, tick, &mut frame).is_ok() {
+            return Some(frame);
+        }
+    }
+    None
 }
 
 /// The driver's segment, everywhere else: read-only.
@@ -192,29 +230,12 @@ impl DriverView {
         if tick > LAST_TICK {
             return Err(FrameUnavailable::NotYet(tick));
         }
-        let slot = &self.map.frames[slot_of(tick, RING_FRAMES)];
-        let (used, beyond) = words_of_mut(frame).split_at_mut(self.frame_words);
-        beyond.fill(0);
-        let stamp = seqlock::read(&slot.sequence, &slot.words[..used.len()], used)
-            .map_err(|Torn| FrameUnavailable::Torn(tick))?;
-        match stamp.cmp(&seqlock::stamp(tick)) {
-            std::cmp::Ordering::Equal => Ok(()),
-            std::cmp::Ordering::Less => Err(FrameUnavailable::NotYet(tick)),
-            std::cmp::Ordering::Greater => Err(FrameUnavailable::Overwritten(tick)),
-        }
+        read_frame(&self.map, self.frame_words, tick, frame)
     }
 
     /// Reads the newest frame. `None`: there is none, or a few tries in a row were overtaken.
     pub fn read_latest(&self) -> Option<Frame> {
-        const TRIES: usize = 8;
-        let mut frame = Frame::zeroed();
-        for _ in 0..TRIES {
-            let tick = self.latest_tick()?;
-            if self.read_frame(tick, &mut frame).is_ok() {
-                return Some(frame);
-            }
-        }
-        None
+        read_latest(&self.map, self.frame_words)
     }
 
     /// Sleeps until there is a newer frame than `seen`, or `timeout` passes, or a signal comes. The driver

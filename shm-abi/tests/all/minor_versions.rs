@@ -424,3 +424,35 @@ fn a_request_to_zero_names_its_devices_and_who_asks() {
         assert_eq!((pid, devices), (own_pid(), mask));
     }
 }
+
+/// The motors are off where a frame of an emergency stop shows no force of any device.
+#[test]
+fn whoever_stops_the_motors_is_told_what_the_newest_frame_shows() {
+    let directory = directory();
+    let host = Host::start(directory.path());
+    let told = || client::emergency_stop_over_connection(&host.socket, "today").unwrap().latest();
+    assert_eq!(told(), None, "there is no frame");
+    let (fault, stop) = (DriverState::Fault as u64, FaultReason::EmergencyStop as u64);
+    let mut frame = Frame { device_count: 2, state: DriverState::Active as u64, ..Frame::zeroed() };
+    frame.devices[1].force_on_user_n_applied = [0.0, 0.1, 0.0];
+    let mut newest = |change: &dyn Fn(&mut Frame)| {
+        change(&mut frame);
+        frame.tick += 1;
+        host.memory.write_frame(&frame);
+        host.memory.ring(frame.tick, None);
+        told()
+    };
+    assert_eq!(newest(&|frame| frame.fault = 0), Some((1, false)));
+    assert_eq!(
+        newest(&|frame| (frame.state, frame.fault) = (fault, stop)),
+        Some((2, false)),
+        "still a force"
+    );
+    assert_eq!(newest(&|frame| frame.devices[1] = Zeroable::zeroed()), Some((3, true)));
+    assert_eq!(
+        newest(&|frame| frame.fault = FaultReason::Overspeed as u64),
+        Some((4, false)),
+        "another fault"
+    );
+    assert_eq!(newest(&|frame| (frame.state, frame.fault) = (0, stop)), Some((5, false)), "left");
+}
