@@ -40,6 +40,7 @@ mod fold;
 mod hole;
 mod junction;
 mod labels;
+mod ledge;
 pub mod make;
 mod mesh_cone;
 mod nesting;
@@ -127,7 +128,8 @@ impl Mesh {
     #[must_use]
     pub fn into_sheet(mut self) -> Self {
         for face in &mut self.faces {
-            (face.sides, face.is_crossed, face.is_beside) = (Sides::Sheet, false, false);
+            face.sides = Sides::Sheet;
+            (face.is_crossed, face.is_beside, face.is_at_ledge) = (false, false, false);
         }
         Self { sides: Sides::Sheet, has_inside: false, has_cracks: false, ..self }
     }

@@ -118,6 +118,7 @@ impl Mesh {
         report.crossed = mesh.mark_crossed();
         mesh.turn_outward(&parts, &mut report);
         report.narrow_gaps = mesh.mark_beside(&parts);
+        mesh.mark_ledges();
         Ok((mesh, report))
     }
 }
@@ -148,6 +149,7 @@ fn face(triangle: &Triangle, links: &[Link; 3], sides: Sides, vertices: &[Vector
         sides,
         is_crossed: false,
         is_beside: false,
+        is_at_ledge: false,
     }
 }
 

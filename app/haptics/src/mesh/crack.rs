@@ -134,6 +134,17 @@ pub(super) fn over_ledge(
     hip_B: &Vector3<f64>,
 ) -> Option<Place> {
     let facet = Facet::of(mesh, side);
+    if is_flush(mesh, wall, &facet.normal_B) { over_wall(mesh, &facet, at_B, way_B, hip_B) } else { None }
+}
+
+/// The same where the wall is known for a low one.
+pub(super) fn over_wall(
+    mesh: &Mesh,
+    facet: &Facet<'_>,
+    at_B: &Vector3<f64>,
+    way_B: &Vector3<f64>,
+    hip_B: &Vector3<f64>,
+) -> Option<Place> {
     let along = |v_B: &Vector3<f64>| v_B - facet.normal_B * facet.normal_B.dot(v_B);
     // A way that ends at once has no direction of its own.
     let way_B = along(way_B).try_normalize(0.0).or_else(|| along(&(hip_B - at_B)).try_normalize(0.0))?;
@@ -141,11 +152,7 @@ pub(super) fn over_ledge(
         let within_B = at_B - way_B * (2.0 * widest_m(mesh.extent_m));
         has_part_before(mesh, &within_B, &facet.normal_B)
     };
-    if facet.depth_m(hip_B) <= 0.0 || !is_flush(mesh, wall, &facet.normal_B) || is_wall() {
-        None
-    } else {
-        step(mesh, &facet, at_B, &way_B)
-    }
+    if facet.depth_m(hip_B) <= 0.0 || is_wall() { None } else { step(mesh, facet, at_B, &way_B) }
 }
 
 /// True for a wall that is parallel to a face, or from which a parallel face is at most two edges away: another part's foot

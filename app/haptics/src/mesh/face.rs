@@ -24,6 +24,8 @@ pub struct Face {
     pub is_crossed: bool,
     /// Presence of another closed part beside it, touching or with a crack between them that no finger feels.
     pub is_beside: bool,
+    /// It is a wall so low that no finger feels it, or has a vertex of one.
+    pub is_at_ledge: bool,
 }
 
 /// The neighbour across an edge: which face, which of its edges is the shared one, and how it is wound.

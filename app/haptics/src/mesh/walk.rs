@@ -35,6 +35,7 @@ use super::crack::{self, Beyond};
 use super::crossing::{follow_crossing, meet_others, plane_at_crossing};
 use super::draw::{Draw, Drawn};
 use super::facing::facing;
+use super::ledge::off_ledge;
 use super::place::{Facet, On, Place, Side, next};
 use crate::friction_cone::ConeInput;
 use crate::surface::direction_or_up;
@@ -66,9 +67,19 @@ pub(crate) struct Walked {
 #[inline(always)]
 pub(crate) fn stand(mesh: &Mesh, mut place: Place, input: &ConeInput) -> Option<(Place, TangentView)> {
     let hip_B = input.hip_B;
-    for _ in 0..MAX_FLIGHTS {
+    for flight in 0..MAX_FLIGHTS {
         if let Some(mut on) = facing(mesh, place, hip_B) {
-            if mesh.faces[place.face() as usize].is_beside {
+            let face = &mesh.faces[place.face() as usize];
+            // What holds the HIP goes on holding it where there are too many ledges.
+            let may_step = flight + 1 < MAX_FLIGHTS;
+            if may_step
+                && face.is_at_ledge
+                && let Some(next) = off_ledge(mesh, &place.point_B, on, &hip_B)
+            {
+                place = next;
+                continue;
+            }
+            if may_step && face.is_beside {
                 match held_beside(mesh, &place, on, &hip_B) {
                     Held::By(other) => on = other,
                     Held::Over(next) => {

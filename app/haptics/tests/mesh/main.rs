@@ -16,6 +16,7 @@ mod friction;
 mod grooves;
 mod inside;
 mod joints;
+mod ledges;
 mod materials;
 mod moving;
 mod nesting;
