@@ -53,6 +53,40 @@ pub(super) fn of_objects(
     Figure::new("How objects moved", bodies.iter().flat_map(panels).collect())
 }
 
+/// The same of all in one panel, along the axis of the world on which they moved most; a panel in which nothing changes is left
+/// out.
+pub(super) fn of_objects_together(recorded: &Recorded, bodies: &[RecordedBody]) -> Figure {
+    let ways_mm: Vec<_> = bodies.iter().map(way_mm).collect();
+    let farthest = |axis: &usize| ways_mm.iter().flatten().map(|way| way[*axis].abs()).fold(0.0, f64::max);
+    let axis = (0..3).max_by(|a, b| farthest(a).total_cmp(&farthest(b))).unwrap_or(0);
+    let moved = ways_mm.iter().map(|way| way.iter().map(|way_mm| way_mm[axis]).collect()).collect();
+    let turned = bodies.iter().map(angles_deg).collect();
+    let panel = |quantity: &str, unit, values: Vec<Vec<f64>>| {
+        let chart = Chart::new("", Axis::linear("time", "s"), Axis::linear(quantity, unit));
+        let is_still = values.iter().flatten().all(|value| *value == 0.0);
+        let series = bodies.iter().zip(values).enumerate().map(|(index, (body, values))| {
+            let points: Vec<_> = recorded.times_s.iter().copied().zip(values).collect();
+            Series::new(&body.name, Look::Line, thinned(&points)).coloured(index)
+        });
+        (!is_still).then(|| series.fold(chart, Chart::with))
+    };
+    let moved = panel(&format!("moved along {}", ["x", "y", "z"][axis]), "mm", moved);
+    let turned = panel("turned", "deg", turned);
+    Figure::new("How objects moved", [moved, turned].into_iter().flatten().collect())
+}
+
+/// Ways since the first row.
+fn way_mm(body: &RecordedBody) -> Vec<Vector3<f64>> {
+    let first = body.positions.first().copied().unwrap_or_default();
+    body.positions.iter().map(|at| (at - first) * 1e3).collect()
+}
+
+/// Angles to the first row's orientation.
+fn angles_deg(body: &RecordedBody) -> Vec<f64> {
+    let from = body.orientations.first().copied().unwrap_or_default();
+    body.orientations.iter().map(|at| from.angle_to(at).to_degrees()).collect()
+}
+
 fn with_motion(
     [moved, turned]: [Chart; 2],
     times_s: &[f64],
@@ -60,14 +94,10 @@ fn with_motion(
     look: Look,
     suffix: &str,
 ) -> [Chart; 2] {
-    let first = body.positions.first().copied().unwrap_or_default();
-    let way_mm: Vec<_> = body.positions.iter().map(|at| (at - first) * 1e3).collect();
-    let from = body.orientations.first().copied().unwrap_or_default();
-    let angles_deg = body.orientations.iter().map(|at| from.angle_to(at).to_degrees());
-    let angles_deg: Vec<_> = times_s.iter().copied().zip(angles_deg).collect();
+    let angles_deg: Vec<_> = times_s.iter().copied().zip(angles_deg(body)).collect();
     let label = if suffix.is_empty() { "" } else { &suffix[2..] };
     [
-        with_components(moved, times_s, &way_mm, look, suffix),
+        with_components(moved, times_s, &way_mm(body), look, suffix),
         turned.with(Series::new(label, look, thinned(&angles_deg))),
     ]
 }

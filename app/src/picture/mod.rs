@@ -2,7 +2,7 @@
 //!
 //! Model: the force on the user along the time, or, with `--by-entity`, along the way that the finger went on each
 //! entity, one picture per entity: this is where two ways to render the same thing are compared (`--against`). With
-//! `--objects`, how far what moves went and turned. Of a recording that is damaged behind its first row the rows before are
+//! `--objects`, how far what moves went and turned, each for itself or together. Of a recording that is damaged behind its first row the rows before are
 //! drawn, and then it is a fault (status 3), as it is for `export`.
 
 mod figure;
@@ -13,7 +13,7 @@ mod visit;
 use crate::outcome::{RunFailure, Stop};
 use crate::outputs::{self, Output, tell};
 use clap::Args;
-use figure::{of_entity, of_objects, of_run};
+use figure::{of_entity, of_objects, of_objects_together, of_run};
 use plot::{Figure, PlotError};
 use recorded::{Recorded, RecordedFinger};
 use rt_core::plain_text::Plain;
@@ -44,6 +44,9 @@ pub struct PlotArgs {
     /// How far the objects moved and turned, instead of what the fingers felt
     #[arg(long, conflicts_with_all = ["by_entity", "finger"])]
     objects: bool,
+    /// With --objects: all of them in one panel, along the axis on which they moved most
+    #[arg(long, requires = "objects", conflicts_with = "against")]
+    together: bool,
     /// Pictures for the web alone, without PNG
     #[arg(long)]
     svg_only: bool,
@@ -91,6 +94,9 @@ fn draw(
     if args.objects {
         let others = against.map(|against| (against, &*against.bodies));
         let bodies = recorded.moving().map_err(|error| wrong(&error))?;
+        if args.together {
+            return write(&of_objects_together(recorded, bodies), out, args.svg_only);
+        }
         return write(&of_objects(recorded, bodies, others), out, args.svg_only);
     }
     if !args.by_entity {
