@@ -103,7 +103,7 @@ pub enum RunFailure {
     /// Somebody ended the lease of a run whose driver goes on.
     #[error(
         "this run's lease has ended, and its force with it; the driver goes on for whoever commands next: somebody ended it \
-         (`io-driver end-lease`), or the driver could not put it in force, which it says in its log"
+         (`io-driver end-lease`), or the driver gave it to somebody else or could not put it in force, which it says in its log"
     )]
     LeaseEnded,
     /// The driver publishes no frames any more.

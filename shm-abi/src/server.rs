@@ -29,7 +29,7 @@ use crate::segment::{CommanderView, DriverMemory, LeaseOffer, SegmentError};
 use crate::socket_file::{Lock, SocketFile, make_sure_nobody_listens, without_end};
 use crate::{socket, users};
 use connection::{Connection, Heard, Offer, Stage, timespec};
-use lapsed::Lapsed;
+use lapsed::{Lapsed, Rival};
 use places::Purpose;
 use rustix::event::{PollFd, PollFlags, poll};
 use rustix::io::Errno;
@@ -57,8 +57,6 @@ const BACKLOG: i32 = 64;
 const ACCEPT_REST: Duration = Duration::from_millis(100);
 /// How often it is looked whether a commander has mapped its segment.
 const OFFER_LOOK: Duration = Duration::from_millis(1);
-/// A commander that has not mapped its memory by then gives way to another user's: an honest one takes milliseconds.
-const MAPPED_WITHIN: Duration = Duration::from_millis(100);
 /// Time between two looks whether those who have left still hold what they were handed.
 const UNREAD_LOOK: Duration = Duration::from_millis(100);
 
@@ -334,7 +332,7 @@ impl Server {
     fn hang_up(&mut self, index: usize, to: &mut impl Recipient) {
         let former = std::mem::replace(&mut self.connections[index].stage, Stage::Gone);
         if matches!(former, Stage::Commanding { offer: Some(_), .. }) {
-            self.lapsed.note(self.connections[index].owner().user);
+            self.lapsed.note_handed_back(self.rival(index));
         }
         // With an offer, the loop knows nothing of it yet.
         if let Stage::Commanding { lease, offer: None, .. } = former {
@@ -445,18 +443,22 @@ impl Server {
         to: &mut impl Recipient,
     ) -> Stage {
         self.end_lease_of_the_dead(to);
-        self.displace_idle_offer(index);
-        if self.holder().is_some() {
-            let _ = to.take(ServerEvent::LeaseRefused);
-            return self.refuse(index, Verdict::LeaseHeld);
-        }
-        if !self.has_place(index, Purpose::Command) {
-            return self.refuse(index, Verdict::Crowded);
-        }
         let connection = &self.connections[index];
         let process = Process::of(connection.stream.as_fd(), &connection.peer);
         if matches!(process, Process::Ended) {
             return Stage::Gone;
+        }
+        // Whoever gets nothing himself takes nothing away.
+        let has_place = self.has_place(index, Purpose::Command);
+        if has_place {
+            self.displace_offer(index, to);
+        }
+        if self.holder().is_some() {
+            let _ = to.take(ServerEvent::LeaseRefused);
+            return self.refuse(index, Verdict::LeaseHeld);
+        }
+        if !has_place {
+            return self.refuse(index, Verdict::Crowded);
         }
         let lease = self.next_lease;
         let offer = match LeaseOffer::create(lease, request.abi_version) {
@@ -555,20 +557,33 @@ impl Server {
         }
     }
 
-    /// Takes a lease that is not in force back for this newcomer, from one who had time to map its memory, or whose user has let
-    /// an offer lapse shortly before; for an administrator at once.
-    fn displace_idle_offer(&mut self, newcomer: usize) {
-        let asks = self.connections[newcomer].owner().user;
+    /// Takes an offer that gives way to this newcomer back from its holder, and says so, but not again and again of one who lets
+    /// every offer lapse.
+    fn displace_offer(&mut self, newcomer: usize, to: &mut impl Recipient) {
         let Some((holder, connection)) = self.holder() else { return };
-        let Stage::Commanding { offer: Some(offer), .. } = &connection.stage else { return };
-        let user = connection.owner().user;
-        let is_idle = offer.age() > MAPPED_WITHIN || self.lapsed.contains(&user);
-        let is_below =
-            self.check(newcomer, Right::Administer).is_ok() && self.check(holder, Right::Administer).is_err();
-        if user != asks && (is_idle || is_below) {
-            self.connections[holder].stage = Stage::Gone;
-            self.lapsed.note(user);
+        let Stage::Commanding { offer: Some(offer), name, .. } = &connection.stage else { return };
+        let rivals = [self.rival(holder), self.rival(newcomer)];
+        if !self.lapsed.gives_way(rivals[0], rivals[1], offer.is_idle()) {
+            return;
         }
+        let [held_by, asked_by] =
+            [holder, newcomer].map(|index| ProcessWords(self.connections[index].peer.pid.into()));
+        let message = format!(
+            "{held_by} ({name}) has not taken the lease that it was offered, and loses it to {asked_by}"
+        );
+        if !self.lapsed.contains(rivals[0].user) {
+            let _ = to.take(ServerEvent::Trouble { message });
+        }
+        // One of whom an administrator wants it has done nothing wrong.
+        if !rivals[1].is_administrator {
+            self.lapsed.note(rivals[0]);
+        }
+        self.connections[holder].stage = Stage::Gone;
+    }
+
+    fn rival(&self, index: usize) -> Rival {
+        let is_administrator = self.check(index, Right::Administer).is_ok();
+        Rival { user: self.connections[index].owner().user, is_administrator }
     }
 
     fn answer(&self, index: usize, answer: &Answer, fds: &[BorrowedFd<'_>]) -> io::Result<()> {
@@ -582,24 +597,22 @@ impl Server {
     }
 
     fn drop_the_silent(&mut self, to: &mut impl Recipient) {
-        for connection in &mut self.connections {
-            let is_silent = match &connection.stage {
-                Stage::Asking { since, .. } => since.elapsed() > PATIENCE,
+        for index in 0..self.connections.len() {
+            let connection = &self.connections[index];
+            match &connection.stage {
+                Stage::Asking { since, .. } if since.elapsed() > PATIENCE => {}
                 // The loop knows nothing of this lease yet.
                 Stage::Commanding { offer: Some(offer), name, .. } if offer.is_overdue() => {
                     let (process, why) = (ProcessWords(connection.peer.pid.into()), offer.why_overdue());
                     let message = format!("{process} ({name}) gets no lease: {why}");
                     let _ = to.take(ServerEvent::Trouble { message });
-                    true
+                    if !offer.waits_for_others() {
+                        self.lapsed.note(self.rival(index));
+                    }
                 }
-                _ => false,
-            };
-            if is_silent {
-                if matches!(connection.stage, Stage::Commanding { .. }) {
-                    self.lapsed.note(connection.owner().user);
-                }
-                connection.stage = Stage::Gone;
+                _ => continue,
             }
+            self.connections[index].stage = Stage::Gone;
         }
     }
 
@@ -610,6 +623,7 @@ impl Server {
 
 #[cfg(test)]
 mod tests {
+    use super::lapsed::MAPPED_WITHIN;
     use super::*;
     use crate::doorbell::WaitMode;
     use crate::segment::{ClockMode, DriverInfo};
@@ -633,12 +647,8 @@ mod tests {
         (far, Verdict::from_word(answer.verdict).unwrap())
     }
 
-    #[test]
-    #[cfg_attr(miri, ignore = "sockets are the system's")]
-    fn an_offer_that_nobody_takes_gives_way_to_other_users_and_at_once_to_administrators() {
-        let directory = tempfile::tempdir().unwrap();
-        let mut server = Server::bind(&directory.path().join("driver.sock")).unwrap();
-        let memory = DriverMemory::create(&DriverInfo {
+    fn driver_info() -> DriverInfo {
+        DriverInfo {
             period_ns: 1_000_000,
             reply_budget_ns: 300_000,
             max_command_age_ticks: 5,
@@ -650,28 +660,75 @@ mod tests {
             cpu: None,
             devices: Vec::new(),
             setup_report: String::new(),
-        });
-        let memory = memory.unwrap();
+        }
+    }
+
+    #[test]
+    #[cfg_attr(miri, ignore = "sockets are the system's")]
+    fn an_offer_that_nobody_takes_gives_way_to_other_users_and_at_once_to_administrators() {
+        let directory = tempfile::tempdir().unwrap();
+        let mut server = Server::bind(&directory.path().join("driver.sock")).unwrap();
+        let memory = DriverMemory::create(&driver_info()).unwrap();
         let owner = server.rights.owner;
         let [one, other] = [owner + 1, owner + 2];
-        let command = |server: &mut Server, uid| ask(server, &memory, uid, RequestKind::Command);
-        let (_first, granted) = command(&mut server, one);
-        assert_eq!(granted, Verdict::Granted);
+        let mut command = |uid| ask(&mut server, &memory, uid, RequestKind::Command);
+        let [(_first, granted), (_refused, held)] = [one, other].map(&mut command);
         // He may still be about to map it.
-        assert_eq!(command(&mut server, other).1, Verdict::LeaseHeld);
-        let (_second, granted) = command(&mut server, owner);
+        assert_eq!([granted, held], [Verdict::Granted, Verdict::LeaseHeld]);
+        let (_second, granted) = command(owner);
         assert_eq!(granted, Verdict::Granted, "an administrator");
-        assert_eq!(command(&mut server, one).1, Verdict::LeaseHeld);
         std::thread::sleep(MAPPED_WITHIN + Duration::from_millis(20));
-        assert_eq!(command(&mut server, owner).1, Verdict::LeaseHeld, "it is his own");
-        let (_third, granted) = command(&mut server, one);
-        assert_eq!(granted, Verdict::Granted, "time enough");
-        // Who lets one lapse gives way at once for a while.
-        let (_fourth, granted) = command(&mut server, other);
+        assert_eq!(command(one).1, Verdict::LeaseHeld, "an administrator's");
+        assert_eq!(command(owner).1, Verdict::LeaseHeld, "it is his own");
+        server.connections.clear();
+        let mut command = |uid| ask(&mut server, &memory, uid, RequestKind::Command);
+        let (_third, granted) = command(one);
         assert_eq!(granted, Verdict::Granted);
-        assert_eq!(command(&mut server, one).1, Verdict::LeaseHeld);
-        server.lapsed.note(Some(other));
-        assert_eq!(command(&mut server, one).1, Verdict::Granted);
+        std::thread::sleep(MAPPED_WITHIN + Duration::from_millis(20));
+        let (_fourth, granted) = command(other);
+        assert_eq!(granted, Verdict::Granted, "time enough");
+        // Who lets one lapse gets none from others until they had time enough.
+        assert_eq!(command(one).1, Verdict::LeaseHeld);
+    }
+
+    /// Sends requests to command as two users, one of whom has no place to command from.
+    #[test]
+    #[cfg_attr(miri, ignore = "sockets are the system's")]
+    fn who_gets_no_lease_himself_takes_no_offer_from_others() {
+        let directory = tempfile::tempdir().unwrap();
+        let mut server = Server::bind(&directory.path().join("driver.sock")).unwrap();
+        let memory = DriverMemory::create(&driver_info()).unwrap();
+        let [one, other] = [server.rights.owner + 1, server.rights.owner + 2];
+        // Their other ends leave unread what they were sent.
+        let far: Vec<_> = (0..COMMANDERS.of_process)
+            .map(|_| {
+                let (far, near) = UnixStream::pair().unwrap();
+                let peer = Peer { uid: other, ..Peer::of(far.as_fd()).unwrap() };
+                let mut gone = Connection::new(near, peer);
+                let offer = LeaseOffer::create(1, crate::layout::ABI_VERSION).unwrap();
+                socket::send(gone.stream.as_fd(), &Answer::new(Verdict::Granted), &[memory.fd(), offer.fd()])
+                    .unwrap();
+                let made = Stage::Commanding {
+                    lease: 1,
+                    name: "test".into(),
+                    process: Process::Unknown,
+                    offer: Some(Offer::Made(offer)),
+                };
+                gone.served(made);
+                gone.stage = Stage::Gone;
+                server.connections.push(gone);
+                far
+            })
+            .collect();
+        let (_offered, granted) = ask(&mut server, &memory, one, RequestKind::Command);
+        assert_eq!(granted, Verdict::Granted);
+        server.lapsed.note(Rival { user: Some(one), is_administrator: false });
+        assert_eq!(ask(&mut server, &memory, other, RequestKind::Command).1, Verdict::LeaseHeld);
+        assert!(matches!(server.holder(), Some((_, holder)) if holder.owner().user == Some(one)));
+        // With a place again he gets it: the holder has lapsed.
+        drop(far);
+        server.connections.retain(|connection| !connection.is_gone());
+        assert_eq!(ask(&mut server, &memory, other, RequestKind::Command).1, Verdict::Granted);
     }
 
     #[test]

@@ -61,9 +61,9 @@ impl LeaseOffer {
             || (!self.tells && self.made.elapsed() >= MAPPED_WITHIN)
     }
 
-    /// Time since it was made.
-    pub fn age(&self) -> Duration {
-        self.made.elapsed()
+    /// Whether a commander that tells when it has mapped it has not done so within this time.
+    pub fn is_idle(&self, within: Duration) -> bool {
+        self.tells && !self.is_mapped() && self.made.elapsed() > within
     }
 
     /// Whether the commander had time enough to map it.

@@ -1,5 +1,6 @@
 //! One client of the server, and how far it has come.
 
+use super::lapsed;
 use super::places::{Owner, Purpose};
 use crate::handshake::Request;
 use crate::peer::{Peer, Process, has_unread};
@@ -62,12 +63,14 @@ impl Offer {
         }
     }
 
-    /// Time since it was made, or since its memory was mapped.
-    pub(super) fn age(&self) -> Duration {
-        match self {
-            Self::Made(offer) => offer.age(),
-            Self::Sealing { since } => since.elapsed(),
-        }
+    /// True if it could have been mapped by now, and has not been.
+    pub(super) fn is_idle(&self) -> bool {
+        matches!(self, Self::Made(offer) if offer.is_idle(lapsed::MAPPED_WITHIN))
+    }
+
+    /// Mapped, and not being sealed because another one is.
+    pub(super) fn waits_for_others(&self) -> bool {
+        matches!(self, Self::Made(offer) if offer.is_mapped())
     }
 
     /// True if it had time enough.
