@@ -9,7 +9,7 @@ use crate::peer::{Peer, ProcessWords};
 use crate::segment::{self, CommanderMemory, DriverView, SegmentError};
 use crate::socket;
 use crate::socket_file;
-use crate::stop_socket;
+use crate::stop_socket::{self, Sent};
 use rustix::net::sockopt::{Timeout, set_socket_timeout};
 use rustix::net::{AddressFamily, SocketAddrUnix, SocketFlags, SocketType};
 use std::io;
@@ -231,14 +231,20 @@ pub fn clear_fault_as_of(asked_ns: u64, socket: &Path, name: &str) -> Result<(),
     exchange(socket, &request).map(|_| ())
 }
 
-/// Asks the driver to switch all motors off at once: by datagram, which a driver hears whose service is stuck, else over
-/// a connection. They stay off until [`clear_fault`]. That it was asked does not say that it was done: a frame tells,
+/// Asks the driver to switch all motors off at once: by datagram, which a driver hears whose service is stuck, and over
+/// a connection where none was taken. They stay off until [`clear_fault`]. That it was asked does not say that it was done: a frame tells,
 /// and a fault that is to be left is to be waited for first.
 ///
 /// # Errors
 /// Why it could be asked in neither way.
 pub fn emergency_stop(socket: &Path, name: &str) -> Result<(), AttachError> {
-    stop_socket::send(socket).or_else(|_| emergency_stop_over_connection(socket, name).map(|_| ()))
+    let sent = stop_socket::send(socket);
+    if matches!(sent, Ok(Sent::Queued)) {
+        return Ok(());
+    }
+    let asked = emergency_stop_over_connection(socket, name);
+    // Stops of others are on their way.
+    if sent.is_ok() { Ok(()) } else { asked.map(drop) }
 }
 
 /// The same over a connection alone. The answer says that the driver has heard it, and, of a driver that tells, the tick
@@ -477,5 +483,21 @@ fn talk_error(path: &Path, error: io::Error) -> AttachError {
             hung_up(socket)
         }
         _ => AttachError::System { what: "talk to the driver", socket, source: error },
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn who_is_not_root_is_told_of_root_in_its_own_numbers() {
+        let owners = "root and the user that the driver runs as";
+        assert_eq!(allowed_in_words(None, 1000), owners);
+        assert_eq!(
+            allowed_in_words(None, 0),
+            format!("{owners}, by the numbers of the driver's own user namespace,")
+        );
+        assert_eq!(allowed_in_words(Some(0), 1000), "members of group 0 (root)");
     }
 }

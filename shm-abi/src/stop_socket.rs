@@ -3,7 +3,8 @@
 //! Problem: a connection has to be accepted, needs a free descriptor and waits for the thread that serves all others.
 //! Model: a second socket lies beside the driver's, named like it with `.stop` behind. Whatever is sent to it, even
 //! nothing, is an emergency stop; the kernel tells which user sent it. Whoever may connect to the driver may send. A
-//! queue that is full holds stops that are on their way, so sending never waits.
+//! queue that is full holds stops that are on their way, so sending never waits; whoever wants a stop to be his own, which
+//! nobody else may undo, asks over a connection then.
 //! Invariants: the receiver acts on a datagram before anybody takes it, and takes it in another thread ([`Drain`]):
 //! before Linux 6.16 descriptors that come with it take as long to close as their sender likes (a TCP connection that
 //! lingers). It needs neither memory nor descriptors for it.
@@ -27,18 +28,40 @@ pub fn path_beside(socket: &Path) -> PathBuf {
     socket_file::suffixed(socket, SUFFIX)
 }
 
-/// Asks the driver at `socket` for an emergency stop; never waits.
+/// Outcome of sending.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Sent {
+    /// It is in the queue.
+    Queued,
+    /// The queue is full of stops, which are on their way and may all be others'.
+    QueueFull,
+}
+
+/// Asks the driver at `socket` for an emergency stop; never waits. Where nothing lies beside that name and it is a symbolic
+/// link, the driver is asked at what that leads to.
 ///
 /// # Errors
 /// If there is no driver, or the kernel does not let us send. That it was sent does not say that it was done: a frame
 /// tells.
-pub fn send(socket: &Path) -> io::Result<()> {
+pub fn send(socket: &Path) -> io::Result<Sent> {
+    let sent = send_beside(socket);
+    let Err(error) = &sent else { return sent };
+    if !matches!(error.kind(), io::ErrorKind::NotFound | io::ErrorKind::NotADirectory) {
+        return sent;
+    }
+    match std::fs::canonicalize(socket) {
+        Ok(target) => send_beside(&target).or(sent),
+        Err(_) => sent,
+    }
+}
+
+fn send_beside(socket: &Path) -> io::Result<Sent> {
     let address = SocketAddrUnix::new(path_beside(socket))?;
     let sender =
         rustix::net::socket_with(AddressFamily::UNIX, SocketType::DGRAM, SocketFlags::CLOEXEC, None)?;
     match rustix::net::sendto(&sender, b"stop", SendFlags::DONTWAIT | SendFlags::NOSIGNAL, &address) {
-        // The queue is full of stops.
-        Ok(_) | Err(rustix::io::Errno::AGAIN) => Ok(()),
+        Ok(_) => Ok(Sent::Queued),
+        Err(rustix::io::Errno::AGAIN) => Ok(Sent::QueueFull),
         Err(errno) => Err(errno.into()),
     }
 }

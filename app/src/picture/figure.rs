@@ -1,5 +1,6 @@
 //! Forces as figures.
 
+use super::Together;
 use super::recorded::{Recorded, RecordedBody, RecordedFinger};
 use super::visit::Visit;
 use nalgebra::Vector3;
@@ -53,26 +54,26 @@ pub(super) fn of_objects(
     Figure::new("How objects moved", bodies.iter().flat_map(panels).collect())
 }
 
-/// The same of all in one panel, along the axis of the world on which they moved most; a panel in which nothing changes is left
-/// out.
-pub(super) fn of_objects_together(recorded: &Recorded, bodies: &[RecordedBody]) -> Figure {
-    let ways_mm: Vec<_> = bodies.iter().map(way_mm).collect();
-    let farthest = |axis: &usize| ways_mm.iter().flatten().map(|way| way[*axis].abs()).fold(0.0, f64::max);
-    let axis = (0..3).max_by(|a, b| farthest(a).total_cmp(&farthest(b))).unwrap_or(0);
-    let moved = ways_mm.iter().map(|way| way.iter().map(|way_mm| way_mm[axis]).collect()).collect();
-    let turned = bodies.iter().map(angles_deg).collect();
-    let panel = |quantity: &str, unit, values: Vec<Vec<f64>>| {
-        let chart = Chart::new("", Axis::linear("time", "s"), Axis::linear(quantity, unit));
-        let is_still = values.iter().flatten().all(|value| *value == 0.0);
-        let series = bodies.iter().zip(values).enumerate().map(|(index, (body, values))| {
-            let points: Vec<_> = recorded.times_s.iter().copied().zip(values).collect();
-            Series::new(&body.name, Look::Line, thinned(&points)).coloured(index)
-        });
-        (!is_still).then(|| series.fold(chart, Chart::with))
+/// The same of all in one panel: along the axis of the world on which they moved most, or how far they turned.
+pub(super) fn of_objects_together(recorded: &Recorded, bodies: &[RecordedBody], what: Together) -> Figure {
+    let (quantity, unit, values) = match what {
+        Together::Moved => {
+            let ways_mm: Vec<_> = bodies.iter().map(way_mm).collect();
+            let farthest =
+                |axis: usize| ways_mm.iter().flatten().map(|way| way[axis].abs()).fold(0.0, f64::max);
+            let axis = (0..3).max_by(|a, b| farthest(*a).total_cmp(&farthest(*b))).unwrap_or(0);
+            let along = |way: &Vec<Vector3<f64>>| way.iter().map(|way_mm| way_mm[axis]).collect();
+            let moved: Vec<Vec<f64>> = ways_mm.iter().map(along).collect();
+            (format!("moved along {}", ["x", "y", "z"][axis]), "mm", moved)
+        }
+        Together::Turned => ("turned".into(), "deg", bodies.iter().map(angles_deg).collect()),
     };
-    let moved = panel(&format!("moved along {}", ["x", "y", "z"][axis]), "mm", moved);
-    let turned = panel("turned", "deg", turned);
-    Figure::new("How objects moved", [moved, turned].into_iter().flatten().collect())
+    let chart = Chart::new("", Axis::linear("time", "s"), Axis::linear(&quantity, unit));
+    let series = bodies.iter().zip(values).enumerate().map(|(index, (body, values))| {
+        let points: Vec<_> = recorded.times_s.iter().copied().zip(values).collect();
+        Series::new(&body.name, Look::Line, thinned(&points)).coloured(index)
+    });
+    Figure::new("How objects moved", vec![series.fold(chart, Chart::with)])
 }
 
 /// Ways since the first row.

@@ -44,9 +44,9 @@ pub struct PlotArgs {
     /// How far the objects moved and turned, instead of what the fingers felt
     #[arg(long, conflicts_with_all = ["by_entity", "finger"])]
     objects: bool,
-    /// With --objects: all of them in one panel, along the axis on which they moved most
-    #[arg(long, requires = "objects", conflicts_with = "against")]
-    together: bool,
+    /// With --objects: all of them in one panel, how far they moved along the axis on which they moved most, or turned
+    #[arg(long, value_name = "WHAT", requires = "objects", conflicts_with = "against")]
+    together: Option<Together>,
     /// Pictures for the web alone, without PNG
     #[arg(long)]
     svg_only: bool,
@@ -55,6 +55,13 @@ pub struct PlotArgs {
     /// [default: the recording's name without its ending; with --objects and -objects behind it]
     #[arg(long, value_name = "OUT")]
     out: Option<PathBuf>,
+}
+
+/// What a panel shows of all objects.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
+enum Together {
+    Moved,
+    Turned,
 }
 
 /// Draws.
@@ -94,8 +101,8 @@ fn draw(
     if args.objects {
         let others = against.map(|against| (against, &*against.bodies));
         let bodies = recorded.moving().map_err(|error| wrong(&error))?;
-        if args.together {
-            return write(&of_objects_together(recorded, bodies), out, args.svg_only);
+        if let Some(what) = args.together {
+            return write(&of_objects_together(recorded, bodies, what), out, args.svg_only);
         }
         return write(&of_objects(recorded, bodies, others), out, args.svg_only);
     }

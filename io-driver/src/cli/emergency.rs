@@ -4,19 +4,22 @@
 //! by datagram first, which never waits and needs no thread, then over a connection. It is done when a new frame shows
 //! the fault and no force in any device; in lockstep, where the loop may wait for its commander and tell no new frame,
 //! when the driver has heard it and the frame that stands shows that. Who finds no place to look from asks again: the answer
-//! to an emergency stop tells what the newest frame shows.
+//! to an emergency stop tells what the newest frame shows. Where only others' stops found a place in the queue of datagrams, it
+//! is not done before the driver has heard this one over the connection, too: else the others alone could undo it.
 //! Invariants: no exit status of 0 without that sight from every driver that was asked. Asking comes before any word.
 //! Asking over a connection and looking have threads of their own: neither a driver that does not answer nor one without
 //! a free place delays the words that motors may still be on.
 
 use super::EXIT_FAULT;
+use super::listeners::Listeners;
 use super::places::{NotAsked, Places, nobody_asked, tell_of_unheard};
 use super::prompt::{PROMPT, PromptWords};
 use crate::print::print_outcome;
 use crate::say::say;
 use shm_abi::client::{self, AttachError};
 use shm_abi::segment::ClockMode;
-use shm_abi::{DriverView, Frame, stop_socket};
+use shm_abi::stop_socket::{self, Sent};
+use shm_abi::{DriverView, Frame};
 use std::path::Path;
 use std::process::ExitCode;
 use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
@@ -56,7 +59,7 @@ type Heard = Arc<OnceLock<Instant>>;
 /// Stops the motors, and says whether that was seen.
 pub(super) fn emergency_stop(places: &Places) -> ExitCode {
     let begun = Instant::now();
-    let sent: Vec<bool> = places.sockets.iter().map(|socket| stop_socket::send(socket).is_ok()).collect();
+    let sent: Vec<_> = places.sockets.iter().map(|socket| stop_socket::send(socket).ok()).collect();
     let (tell, news) = channel();
     let started = places.sockets.iter().zip(&sent).enumerate().try_for_each(|(index, (socket, sent))| {
         start_threads(socket, *sent, begun, &Teller { index, tell: tell.clone() })
@@ -83,7 +86,7 @@ impl Teller {
 }
 
 /// They end with the process, whatever they wait for.
-fn start_threads(socket: &Path, sent: bool, begun: Instant, teller: &Teller) -> std::io::Result<()> {
+fn start_threads(socket: &Path, sent: Option<Sent>, begun: Instant, teller: &Teller) -> std::io::Result<()> {
     let heard = Heard::default();
     let (place, ear, asker) = (socket.to_path_buf(), Arc::clone(&heard), teller.clone());
     std::thread::Builder::new().spawn(move || {
@@ -93,7 +96,7 @@ fn start_threads(socket: &Path, sent: bool, begun: Instant, teller: &Teller) -> 
     })?;
     let (place, teller) = (socket.to_path_buf(), teller.clone());
     let looks = move || {
-        if let Some(sight) = wait_for_zero(&place, &heard, begun + PATIENCE) {
+        if let Some(sight) = wait_for_zero(&place, sent, &heard, begun + PATIENCE) {
             teller.tell(News::Shown(sight));
         }
     };
@@ -101,13 +104,13 @@ fn start_threads(socket: &Path, sent: bool, begun: Instant, teller: &Teller) -> 
 }
 
 /// Over a connection; an error if nobody can have heard it by datagram either.
-fn ask(socket: &Path, sent: bool, heard: &Heard) -> Result<(), AttachError> {
+fn ask(socket: &Path, sent: Option<Sent>, heard: &Heard) -> Result<(), AttachError> {
     match client::emergency_stop_over_connection(socket, NAME) {
         Ok(_) => {
             let _ = heard.set(Instant::now());
             Ok(())
         }
-        Err(_) if sent => Ok(()),
+        Err(_) if sent.is_some() => Ok(()),
         Err(error) => Err(error),
     }
 }
@@ -134,7 +137,7 @@ fn gather(news: &Receiver<(usize, News)>, places: usize, begun: Instant) -> Told
 
 /// One after the other, where the system gives no threads: all are asked before anything is said, for nobody may take
 /// the words.
-fn ask_and_look(places: &Places, sent: &[bool], begun: Instant) -> Told {
+fn ask_and_look(places: &Places, sent: &[Option<Sent>], begun: Instant) -> Told {
     let mut told: Vec<(Heard, Option<News>)> = Vec::new();
     for (socket, sent) in places.sockets.iter().zip(sent) {
         let heard = Heard::default();
@@ -142,9 +145,9 @@ fn ask_and_look(places: &Places, sent: &[bool], begun: Instant) -> Told {
         told.push((heard, refused.map(News::NotAsked)));
     }
     let look = |told: &mut Vec<(Heard, Option<News>)>, until: Instant| {
-        for (socket, (heard, news)) in places.sockets.iter().zip(told) {
+        for ((socket, sent), (heard, news)) in places.sockets.iter().zip(sent).zip(told) {
             if news.is_none() {
-                *news = wait_for_zero(socket, heard, until).map(News::Shown);
+                *news = wait_for_zero(socket, *sent, heard, until).map(News::Shown);
             }
         }
     };
@@ -180,7 +183,8 @@ fn judge(places: &Places, told: Told) -> ExitCode {
     if shown.is_empty() && unseen.is_empty() {
         return nobody_asked(places, &not_asked);
     }
-    if tell_of_unheard(&not_asked) || !unseen.is_empty() {
+    let is_one_unheard = !not_asked.is_empty() && tell_of_unheard(&not_asked, &Listeners::find());
+    if is_one_unheard || !unseen.is_empty() {
         return ExitCode::from(EXIT_FAULT);
     }
     ExitCode::SUCCESS
@@ -197,7 +201,7 @@ fn print_shown(sight: Sight, place: &str) {
 }
 
 /// The frame that shows that the motors are off; `None`: the driver is gone, or no frame shows that in time.
-fn wait_for_zero(socket: &Path, heard: &Heard, until: Instant) -> Option<Sight> {
+fn wait_for_zero(socket: &Path, sent: Option<Sent>, heard: &Heard, until: Instant) -> Option<Sight> {
     let mut first_told = None;
     let attachment = loop {
         match client::observe(socket, NAME) {
@@ -213,9 +217,10 @@ fn wait_for_zero(socket: &Path, heard: &Heard, until: Instant) -> Option<Sight> 
     let driver = &attachment.driver;
     // What stands there already may be old, and the loop dead.
     let stale = driver.latest_tick();
+    let is_own = || sent == Some(Sent::Queued) || heard.get().is_some();
     loop {
         match driver.read_latest().filter(Frame::shows_emergency_stop) {
-            Some(frame) if Some(frame.tick) > stale => return Some(Sight::New(frame.tick)),
+            Some(frame) if Some(frame.tick) > stale && is_own() => return Some(Sight::New(frame.tick)),
             Some(frame) if may_stand(driver, heard) => return Some(Sight::Stands(frame.tick)),
             _ if !attachment.connection.is_open() || Instant::now() > until => return None,
             _ => std::thread::sleep(LOOK),
@@ -236,4 +241,50 @@ fn ask_what_it_shows(socket: &Path, first_told: &mut Option<u64>) -> Option<u64>
 fn may_stand(driver: &DriverView, heard: &Heard) -> bool {
     driver.info().clock_mode == ClockMode::Lockstep
         && heard.get().is_some_and(|heard| heard.elapsed() > STANDS)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::told::memory;
+    use super::*;
+    use bytemuck::Zeroable;
+    use patience::BoundedThread;
+    use shm_abi::server::Server;
+    use shm_abi::{DriverState, FaultReason};
+    use std::sync::atomic::{AtomicBool, Ordering};
+
+    /// Somebody else's stop, which is all that a frame shows, can be undone by him alone.
+    #[test]
+    fn a_stop_for_which_the_queue_had_no_room_is_done_once_the_driver_has_heard_it() {
+        let directory = tempfile::tempdir().expect("a directory");
+        let socket = directory.path().join("driver.sock");
+        let mut server = Server::bind(&socket).expect("nobody else");
+        let is_over = AtomicBool::new(false);
+        let (fault, why) = (DriverState::Fault as u64, FaultReason::EmergencyStop as u64);
+        std::thread::scope(|scope| {
+            let serving = scope.spawn(|| {
+                let memory = memory();
+                for tick in 1.. {
+                    if is_over.load(Ordering::Relaxed) {
+                        break;
+                    }
+                    memory.write_frame(&Frame { tick, state: fault, fault: why, ..Frame::zeroed() });
+                    memory.ring(tick, None);
+                    server.poll(&memory, Duration::from_millis(1), &mut Vec::new()).expect("it waits");
+                }
+            });
+            let heard = Heard::default();
+            let look = |sent| {
+                let until = Instant::now() + Duration::from_millis(200);
+                wait_for_zero(&socket, sent, &heard, until)
+            };
+            let seen = [Some(Sent::Queued), Some(Sent::QueueFull), None].map(look);
+            assert!(matches!(seen, [Some(Sight::New(_)), None, None]), "{seen:?}");
+            heard.set(Instant::now()).expect("once");
+            let seen = [Some(Sent::QueueFull), None].map(look);
+            assert!(matches!(seen, [Some(Sight::New(_)), Some(Sight::New(_))]), "{seen:?}");
+            is_over.store(true, Ordering::Relaxed);
+            serving.bounded_join().expect("no panic");
+        });
+    }
 }

@@ -1,17 +1,23 @@
 //! Driver processes that listen, whatever became of their sockets' files.
 //!
 //! Model: the kernel keeps the name under which a socket was made, which for a driver's ends with the process's number.
-//! A driver with a network of its own, as a service has, is in that network's table alone; so each process's own table
-//! is read. Directories are compared in full, without symbolic links and detours.
-//! Cost: a table for each process that is called like a driver; only for who found no driver to ask.
+//! A driver with a network of its own, as a service has, is in that network's table alone; so the table of each network
+//! in which a process of a driver's name lives is read, once. Directories are compared in full, without symbolic links and
+//! detours.
+//! Bound: anybody may give a process that name, and fill a table. Whoever stops motors waits no longer than [`PATIENCE`] for
+//! the search, but for one table, and is told that it was cut short.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet, HashMap};
+use std::os::unix::fs::MetadataExt;
 use std::path::{Path, PathBuf};
+use std::time::{Duration, Instant};
 
 use shm_abi::socket_file::whole_path;
 
 /// Names of a driver's program: by itself, or within the application.
 const PROGRAMS: [&str; 2] = ["io-driver", "phantom3"];
+/// Longest search.
+const PATIENCE: Duration = Duration::from_secs(1);
 
 /// A driver's process and the socket that it made.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -20,24 +26,47 @@ pub(super) struct Listener {
     pub(super) socket: PathBuf,
 }
 
-/// The process that listens at this path.
-pub(super) fn at(socket: &Path) -> Option<u32> {
-    let wanted = whole_path(socket);
-    all().find(|listener| whole_path(&listener.socket) == wanted).map(|listener| listener.pid)
+/// Drivers of this machine that we can see.
+#[derive(Debug, Default)]
+pub(super) struct Listeners {
+    pub(super) all: Vec<Listener>,
+    /// There was no time to look at all processes.
+    pub(super) is_cut_short: bool,
 }
 
-/// All drivers of this machine that we can see.
-pub(super) fn all() -> impl Iterator<Item = Listener> {
-    drivers().flat_map(|pid| {
-        // A name in it may be any bytes.
-        let table = std::fs::read(format!("/proc/{pid}/net/unix")).unwrap_or_default();
-        let table = String::from_utf8_lossy(&table).into_owned();
-        let status = std::fs::read_to_string(format!("/proc/{pid}/status")).unwrap_or_default();
-        let own = own_number(&status).unwrap_or(pid);
-        let directory = || std::fs::read_link(format!("/proc/{pid}/cwd")).unwrap_or_default();
-        let sockets = sockets_of(own, &table).into_iter().map(|socket| directory().join(socket));
-        sockets.collect::<Vec<PathBuf>>().into_iter().map(move |socket| Listener { pid, socket })
-    })
+impl Listeners {
+    /// Looks for them.
+    pub(super) fn find() -> Self {
+        let begun = Instant::now();
+        let mut found = Self::default();
+        let mut tables = HashMap::new();
+        for pid in drivers() {
+            if begun.elapsed() > PATIENCE {
+                found.is_cut_short = true;
+                break;
+            }
+            // A network has one file of this number; a process that has ended has none.
+            let path = format!("/proc/{pid}/net/unix");
+            let Ok(network) = std::fs::metadata(&path).map(|found| found.ino()) else { continue };
+            let table = tables.entry(network).or_insert_with(|| {
+                // A name in it may be any bytes.
+                Table::of(&String::from_utf8_lossy(&std::fs::read(&path).unwrap_or_default()))
+            });
+            let status = std::fs::read_to_string(format!("/proc/{pid}/status")).unwrap_or_default();
+            let own = own_number(&status).unwrap_or(pid);
+            let directory = || std::fs::read_link(format!("/proc/{pid}/cwd")).unwrap_or_default();
+            let sockets = table.sockets_of(own).map(|socket| directory().join(socket));
+            found.all.extend(sockets.map(|socket| Listener { pid, socket }));
+        }
+        found
+    }
+
+    /// The process that listens at this path, or at what that leads to.
+    pub(super) fn at(&self, socket: &Path) -> Option<u32> {
+        let wanted = [Some(whole_path(socket)), std::fs::canonicalize(socket).ok()];
+        let is_it = |listener: &&Listener| wanted.contains(&Some(whole_path(&listener.socket)));
+        self.all.iter().find(is_it).map(|listener| listener.pid)
+    }
 }
 
 /// All processes that have the driver's name.
@@ -55,18 +84,32 @@ fn own_number(status: &str) -> Option<u32> {
     status.lines().find_map(|line| line.strip_prefix("NSpid:"))?.split_whitespace().next_back()?.parse().ok()
 }
 
-/// The driver's sockets that a table tells of, each once: a connection that was taken has a line with the same name.
-fn sockets_of(pid: u32, table: &str) -> BTreeSet<&str> {
-    table.lines().filter_map(|line| socket_of(pid, line)).collect()
+/// The sockets that a network's table tells of, by the number of the process that made each; each once: a connection that was
+/// taken has a line with the same name.
+struct Table(BTreeMap<u32, BTreeSet<String>>);
+
+impl Table {
+    fn of(text: &str) -> Self {
+        let mut sockets: BTreeMap<u32, BTreeSet<String>> = BTreeMap::new();
+        for (pid, socket) in text.lines().filter_map(socket_of) {
+            sockets.entry(pid).or_default().insert(socket.to_owned());
+        }
+        Self(sockets)
+    }
+
+    fn sockets_of(&self, pid: u32) -> impl Iterator<Item = &str> {
+        self.0.get(&pid).into_iter().flatten().map(String::as_str)
+    }
 }
 
-/// The driver's socket that a line of the table tells of, if this process made it.
-fn socket_of(pid: u32, line: &str) -> Option<&str> {
+/// The driver's socket that a line of the table tells of, and the number of the process that made it.
+fn socket_of(line: &str) -> Option<(u32, &str)> {
     // Address, references, protocol, flags, type, state and inode come before the name.
     let name = (0..7).try_fold(line, |rest, _| Some(rest.trim_start().split_once(' ')?.1))?;
     let (socket, number) = name.rsplit_once('.')?;
     let is_stop_socket = socket.ends_with(".stop");
-    (number == pid.to_string() && !is_stop_socket && !socket.starts_with('@')).then_some(socket)
+    let pid = number.parse().ok()?;
+    (!is_stop_socket && !socket.starts_with('@')).then_some((pid, socket))
 }
 
 #[cfg(test)]
@@ -76,16 +119,15 @@ mod tests {
     #[test]
     fn a_line_of_the_table_names_the_socket_of_the_process_that_made_it() {
         let line = "0000000000000000: 00000002 00000000 00010000 0001 01 114705 /run/a b/driver.sock.77";
-        assert_eq!(socket_of(77, line), Some("/run/a b/driver.sock"));
-        assert_eq!(socket_of(7, line), None);
+        assert_eq!(socket_of(line), Some((77, "/run/a b/driver.sock")));
         let stop = "0000000000000000: 00000002 00000000 00000000 0002 01 114706 /run/a b/driver.sock.stop.77";
-        assert_eq!(socket_of(77, stop), None);
+        assert_eq!(socket_of(stop), None);
         for other in [
             "Num       RefCount Protocol Flags    Type St Inode Path",
             "0000000000000000: 00000003 00000000 00000000 0001 03 114707",
             "0000000000000000: 00000002 00000000 00010000 0001 01 114705 @hidden.77",
         ] {
-            assert_eq!(socket_of(77, other), None);
+            assert_eq!(socket_of(other), None);
         }
     }
 
@@ -100,6 +142,8 @@ mod tests {
     fn a_driver_that_serves_somebody_is_told_once() {
         let table = "0000000000000000: 00000002 00000000 00010000 0001 01 114705 /run/driver.sock.77\n\
                      0000000000000000: 00000003 00000000 00000000 0001 03 114709 /run/driver.sock.77";
-        assert_eq!(sockets_of(77, table), BTreeSet::from(["/run/driver.sock"]));
+        let table = Table::of(table);
+        assert_eq!(table.sockets_of(77).collect::<Vec<_>>(), ["/run/driver.sock"]);
+        assert_eq!(table.sockets_of(7).count(), 0);
     }
 }

@@ -1,6 +1,7 @@
 //! Places of drivers: the socket that somebody named, or the usual ones.
 
-use super::{EXIT_FAULT, EXIT_USAGE, listeners};
+use super::listeners::Listeners;
+use super::{EXIT_FAULT, EXIT_USAGE};
 use crate::say::say;
 use clap::Args;
 use shm_abi::client::AttachError;
@@ -60,10 +61,16 @@ pub(super) type NotAsked = (PathBuf, AttachError);
 
 /// Tells of the drivers that listen at places where they cannot be asked, a socket's file having been moved, deleted or
 /// closed to us; whether there is one. They push on.
-pub(super) fn tell_of_unheard(not_asked: &[NotAsked]) -> bool {
+pub(super) fn tell_of_unheard(not_asked: &[NotAsked], listeners: &Listeners) -> bool {
+    if listeners.is_cut_short {
+        say(format_args!(
+            "io-driver: there was no time to look at all processes that are called like a driver: others may go on that \
+             were not asked"
+        ));
+    }
     let mut is_one_there = false;
     for (socket, error) in not_asked {
-        let Some(pid) = listeners::at(socket) else { continue };
+        let Some(pid) = listeners.at(socket) else { continue };
         is_one_there = true;
         say(format_args!("io-driver: {error}"));
         let why = match error {
@@ -85,7 +92,8 @@ pub(super) fn tell_of_unheard(not_asked: &[NotAsked]) -> bool {
 
 /// Nobody could be asked anywhere: says why, and which drivers live elsewhere.
 pub(super) fn nobody_asked(places: &Places, not_asked: &[NotAsked]) -> ExitCode {
-    if tell_of_unheard(not_asked) {
+    let listeners = Listeners::find();
+    if tell_of_unheard(not_asked, &listeners) {
         return ExitCode::from(EXIT_FAULT);
     }
     let is_telling = |(_, error): &&NotAsked| !matches!(error, AttachError::NoDriver { .. });
@@ -97,8 +105,8 @@ pub(super) fn nobody_asked(places: &Places, not_asked: &[NotAsked]) -> ExitCode 
     let is_silent = not_asked
         .iter()
         .any(|(_, error)| !is_elsewhere(error) || matches!(error, AttachError::HungUp { .. }));
-    let mut code = if is_silent { EXIT_FAULT } else { EXIT_USAGE };
-    for other in listeners::all() {
+    let mut code = if is_silent || listeners.is_cut_short { EXIT_FAULT } else { EXIT_USAGE };
+    for other in listeners.all {
         let (pid, socket) = (other.pid, other.socket.display());
         // Whoever names a driver that is not there has at least heard of those that are.
         if places.is_named {

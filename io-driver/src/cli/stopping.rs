@@ -6,9 +6,10 @@
 //! a driver that does not answer does not delay the words that motors may still be on. Without a thread it is asked
 //! before anything is said.
 
+use super::listeners::Listeners;
 use super::places::{NotAsked, Places, is_elsewhere, nobody_asked, tell_of_unheard};
 use super::prompt::{PROMPT, PromptWords};
-use super::{EXIT_FAULT, EXIT_USAGE, fail, listeners};
+use super::{EXIT_FAULT, EXIT_USAGE, fail};
 use crate::print::print_outcome;
 use crate::say::say;
 use rt_core::epitaph::{self, EpitaphKind};
@@ -39,8 +40,10 @@ pub(super) fn stop(places: &Places) -> ExitCode {
             (_, Err(error)) if is_elsewhere(&error) => not_asked.push((socket.clone(), error)),
             (observer, answer) => {
                 let code = judge_answer(observer, answer, &places.told(socket));
-                let is_one_unheard = tell_of_unheard(&not_asked);
-                tell_of_others(places, socket, &not_asked);
+                let others = places.sockets.len() > 1;
+                let listeners = if others { Listeners::find() } else { Listeners::default() };
+                let is_one_unheard = tell_of_unheard(&not_asked, &listeners);
+                tell_of_others(places, socket, &not_asked, &listeners);
                 return if is_one_unheard { ExitCode::from(EXIT_FAULT) } else { code };
             }
         }
@@ -49,10 +52,10 @@ pub(super) fn stop(places: &Places) -> ExitCode {
 }
 
 /// One driver was asked to end; another one goes on.
-fn tell_of_others(places: &Places, asked: &Path, not_asked: &[NotAsked]) {
+fn tell_of_others(places: &Places, asked: &Path, not_asked: &[NotAsked], listeners: &Listeners) {
     let was_tried = |socket: &Path| socket == asked || not_asked.iter().any(|(other, _)| other == socket);
     for socket in places.sockets.iter().filter(|socket| !was_tried(socket)) {
-        if let Some(pid) = listeners::at(socket) {
+        if let Some(pid) = listeners.at(socket) {
             let socket = socket.display();
             say(format_args!(
                 "io-driver: another driver, process {pid}, goes on; next: io-driver stop --socket {socket}"

@@ -3,7 +3,7 @@
 use patience::prelude::*;
 use patience::{limit, watched};
 use shm_abi::server::Server;
-use shm_abi::stop_socket::{self, StopSocket, path_beside};
+use shm_abi::stop_socket::{self, Sent, StopSocket, path_beside};
 use std::os::unix::fs::PermissionsExt;
 use std::os::unix::net::UnixDatagram;
 use std::sync::mpsc::{Receiver, channel};
@@ -67,10 +67,21 @@ fn sending_never_waits_and_a_full_queue_is_a_stop_on_its_way() {
     // Nobody listens to this one.
     let (_socket, _file) = StopSocket::bind(server.path()).unwrap();
     watched(limit(), "ten thousand stops that nobody takes", || {
-        for _ in 0..10_000 {
-            stop_socket::send(server.path()).unwrap();
-        }
+        let sent: Vec<_> = (0..10_000).map(|_| stop_socket::send(server.path()).unwrap()).collect();
+        assert_eq!((sent[0], sent[9_999]), (Sent::Queued, Sent::QueueFull));
     });
+}
+
+#[test]
+fn a_driver_is_stopped_through_a_link_to_its_socket() {
+    let (directory, server, told) = listening();
+    let link = directory.path().join("elsewhere.sock");
+    std::os::unix::fs::symlink(server.path(), &link).unwrap();
+    assert_eq!(stop_socket::send(&link).unwrap(), Sent::Queued);
+    assert!(told.recv_timeout(limit()).is_ok());
+    std::fs::remove_file(&link).unwrap();
+    std::os::unix::fs::symlink(directory.path().join("nobody.sock"), &link).unwrap();
+    assert_eq!(stop_socket::send(&link).unwrap_err().kind(), std::io::ErrorKind::NotFound);
 }
 
 #[test]

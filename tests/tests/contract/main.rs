@@ -3,6 +3,7 @@
 mod abandoned;
 mod bad_input;
 mod ball;
+mod contact_scenes;
 mod crowd;
 mod csg;
 mod cut;
