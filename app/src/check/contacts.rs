@@ -4,7 +4,8 @@
 //! is that of a run ([`Contacts`]), on one point.
 
 use crate::rig::Rig;
-use haptics::Entity;
+use haptics::mesh::Sides;
+use haptics::{Entity, Shape};
 use physics::collide::{ContactPoints, PairMemory, Solid, bounding_ball, contact_points, is_collidable};
 use physics::{Aabb, Contacts};
 
@@ -62,7 +63,15 @@ impl Looks<'_> {
         let thickness_m =
             [a, b].into_iter().filter_map(|index| self.thickness_m(index)).fold(f64::INFINITY, f64::min);
         let [name, other] = self.names([a, b]);
-        (sinks_m > SHARE_OF_THICKNESS * thickness_m).then(|| {
+        let sinks_m = Some(sinks_m).filter(|sinks_m| *sinks_m > SHARE_OF_THICKNESS * thickness_m)?;
+        let is_by_mass = sinks_m < DEPTH_BY_MASS_M;
+        Some(if is_by_mass {
+            format!(
+                "{name} and {other}: the thinner one is {:.3} mm thick, and contacts are {:.3} mm deep at rest; make it thicker",
+                thickness_m * 1e3,
+                sinks_m * 1e3
+            )
+        } else {
             format!(
                 "{name} sinks {:.2} mm into {other}, as soft as it is ({stiffness_n_per_m:.0} N/m a point); say `contact_stiffness = \
                  {{ kind = \"by-mass\" }}` at the top of the scene, or give {name} a larger `contact_stiffness_n_per_m`",
@@ -75,8 +84,13 @@ impl Looks<'_> {
         self.contacts.between(&self.entities[a], &self.entities[b]).0
     }
 
-    /// Least side of the box around it; `None`: it has no end.
+    /// Least side of the box around it; `None`: it has no end, or is a sheet, through which nothing sinks.
     fn thickness_m(&self, index: usize) -> Option<f64> {
+        let is_sheet =
+            matches!(&self.entities[index].shape, Shape::Mesh(mesh) if mesh.sides() == Sides::Sheet);
+        if is_sheet {
+            return None;
+        }
         Aabb::of_entity(&self.entities[index]).map(|around| (around.high_W - around.low_W).min())
     }
 
@@ -132,4 +146,6 @@ fn depth(a: &Entity, b: &Entity) -> f64 {
 /// A tenth of a millimetre is what rounding in a file leaves.
 const LEAST_DEPTH_M: f64 = 1e-4;
 const SHARE_OF_THICKNESS: f64 = 0.25;
+/// By mass nothing rests deeper: `g / (1000 / s)^2`, and roundings.
+const DEPTH_BY_MASS_M: f64 = 1e-5;
 const MOST_TOLD: usize = 10;

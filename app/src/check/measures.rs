@@ -6,7 +6,7 @@
 //! scene gives a density.
 
 use crate::rig::Rig;
-use haptics::{Entity, Shape};
+use haptics::{Csg, Entity, Shape};
 use nalgebra::{Point3, Vector3};
 use physics::collide::bounding_ball;
 use serde_json::{Value, json};
@@ -26,6 +26,8 @@ pub(super) struct Measures {
     pub(super) size_m: Option<[f64; 3]>,
     /// Whether it has none.
     is_endless: bool,
+    /// Of a solid joined of others nothing is left that could be drawn or felt.
+    pub(super) is_nothing: bool,
     /// The middle of that, in the world (m).
     pub(super) middle_m: [f64; 3],
     /// `None`: it is fixed.
@@ -55,6 +57,7 @@ impl Measures {
             Some(mesh) => seen.corners(mesh),
             None => corners(&spec.shape, &entity.shape),
         };
+        let is_nothing = around.is_none() && matches!(&entity.shape, Shape::Csg(csg) if has_an_end(csg));
         let middle = around.map_or_else(Vector3::zeros, |[least, most]| 0.5 * (least + most));
         // A unit of density makes what the volume is.
         let volume_m3 = mass_kg.and_then(|_| physics::MassProperties::of_density(&entity.shape, 1.0).ok());
@@ -63,7 +66,8 @@ impl Measures {
             kind: spec.shape.kind(),
             is_around: spec.kind == EntityKind::Environment,
             size_m: around.map(|[least, most]| (most - least).into()),
-            is_endless: around.is_none() && only_seen.is_none(),
+            is_endless: around.is_none() && only_seen.is_none() && !is_nothing,
+            is_nothing,
             middle_m: (spec.pose * Point3::from(middle)).coords.into(),
             mass_kg,
             density_kg_m3: mass_kg.zip(volume_m3).map(|(mass_kg, of_one)| mass_kg / of_one.mass_kg),
@@ -89,6 +93,7 @@ impl std::fmt::Display for Measures {
         match self.size_m {
             Some([x, y, z]) => write!(f, ", {} x {} x {} m", short(x), short(y), short(z))?,
             None if self.is_endless => write!(f, ", without an end")?,
+            None if self.is_nothing => write!(f, ", nothing is left of it")?,
             None => write!(f, ", size not measured")?,
         }
         let [x, y, z] = self.middle_m.map(short);
@@ -112,6 +117,16 @@ impl SeenMeshes {
         around(corners.into_iter().map(|corner| corner.component_mul(&scale)))
     }
 }
+
+/// It has nothing far away from where it is described.
+fn has_an_end(csg: &Csg) -> bool {
+    let far_m = FAR * csg.extent_m().max(1.0);
+    let ways = [Vector3::x(), Vector3::y(), Vector3::z()].into_iter().flat_map(|way| [way, -way]);
+    !ways.into_iter().any(|way| csg.is_inside(&(way * far_m)))
+}
+
+/// Extents away, where only what has no end is.
+const FAR: f64 = 1e3;
 
 /// Four digits.
 pub(super) fn short(number: f64) -> String {

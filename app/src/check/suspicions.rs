@@ -14,6 +14,7 @@ use world::{MassSpec, Scene, SceneEntity, ShapeSpec};
 /// All of them.
 pub(super) fn all(rig: &Rig, measures: &[Measures]) -> Vec<String> {
     let mut found: Vec<String> = measures.iter().filter_map(|it| length(rig, it)).collect();
+    found.extend(measures.iter().filter_map(nothing));
     found.extend(measures.iter().filter_map(mass));
     found.extend(densities(&rig.scene));
     found.extend(far(rig, measures));
@@ -54,6 +55,16 @@ fn length(rig: &Rig, it: &Measures) -> Option<String> {
     }
     (length_m < HAIR_M)
         .then(|| format!("{name} is {} m long, finer than a hair; lengths are in metres", short(length_m)))
+}
+
+fn nothing(it: &Measures) -> Option<String> {
+    it.is_nothing.then(|| {
+        format!(
+            "of {} nothing is left, and nobody feels it; of a difference the first child is what the others are taken away from, \
+             and all children of an intersection have to meet",
+            it.name
+        )
+    })
 }
 
 fn spec_of<'r>(rig: &'r Rig, name: &str) -> Option<&'r SceneEntity> {

@@ -193,6 +193,58 @@ fn check_warns_of_what_runs_but_hardly_as_meant() {
 }
 
 #[test]
+fn check_tells_of_solids_of_which_nothing_is_left() {
+    let place = Workplace::new();
+    let solid = |name: &str, op: &str, size_m: f64| {
+        format!(
+            "[[entity]]\nname = \"{name}\"\nshape = {{ kind = \"csg\", op = \"{op}\", children = [{{ shape = {{ kind = \"sphere\", \
+             radius_m = 0.02 }} }}, {{ shape = {{ kind = \"box\", size_m = [{size_m}, {size_m}, {size_m}] }}, position_m = [0.0, 0.03, 0.0] }}] \
+             }}\n"
+        )
+    };
+    let scene = ["[[finger]]\n".to_owned()]
+        .into_iter()
+        .chain([solid("swapped", "difference", 0.2), solid("bitten", "difference", 0.05)])
+        .chain([solid("apart", "intersection", 0.015), solid("slice", "intersection", 0.05)])
+        .collect::<String>();
+    place.write("scene.toml", &scene);
+    let said = check(&place, &["scene.toml"]);
+    for (name, is_nothing) in [("swapped", true), ("bitten", false), ("apart", true), ("slice", false)] {
+        let is_told = said.out.contains(&format!("of {name} nothing is left, and nobody feels it"));
+        let is_measured = said.out.contains(&format!("{name}: csg, nothing is left of it"));
+        assert_eq!([is_told, is_measured], [is_nothing; 2], "{name}: {}", said.out);
+    }
+    assert!(!said.out.contains("without an end"), "{}", said.out);
+}
+
+/// A sheet is not thin: nothing sinks through by being soft. Of a paper no stiffness makes more.
+#[test]
+fn check_says_of_thin_things_only_what_helps() {
+    let place = Workplace::new();
+    place.write("quad.obj", "v -1 0 -1\nv 1 0 -1\nv 1 0 1\nv -1 0 1\nf 4 3 2 1\n");
+    let scene = |thing: &str| {
+        format!(
+            "contact_stiffness = {{ kind = \"by-mass\" }}\n[[finger]]\n[[entity]]\nname = \"floor\"\nshape = {{ kind = \"mesh\", file = \
+             \"quad.obj\" }}\n[[entity]]\nname = \"thing\"\nmass_kg = 0.1\n{thing}\n"
+        )
+    };
+    for (thing, told) in [
+        ("position_m = [0, 0.0202, 0]\nshape = { kind = \"sphere\", radius_m = 0.02 }", None),
+        (
+            "position_m = [0, 2e-5, 0]\nshape = { kind = \"box\", size_m = [0.2, 2e-5, 0.2] }",
+            Some(
+                "the thinner one is 0.020 mm thick, and contacts are 0.010 mm deep at rest; make it thicker",
+            ),
+        ),
+    ] {
+        place.write("scene.toml", &scene(thing));
+        let said = check(&place, &["scene.toml"]);
+        assert!(!said.out.contains("sinks"), "{}", said.out);
+        assert_eq!(told.is_some_and(|words| said.out.contains(words)), told.is_some(), "{}", said.out);
+    }
+}
+
+#[test]
 fn check_judges_stiffness_on_the_sum_at_a_place() {
     let place = Workplace::new();
     let wall = |name: &str, normal: &str| {

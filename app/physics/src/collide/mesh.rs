@@ -9,7 +9,7 @@
 //! times its face plus its number there; where edges cross, four times that, whose it is and from which end), a vertex, or a
 //! point of the other one. No two of a pair clash as long as a mesh has less than 11,000,000 faces.
 
-use haptics::mesh::Mesh;
+use haptics::mesh::{Mesh, Sides};
 use haptics::{Form, Shape};
 use nalgebra::{Isometry3, Point3, Vector3};
 
@@ -27,6 +27,10 @@ pub(super) fn contact_points(
     found: &mut ContactPoints,
 ) {
     match (a.shape, b.shape) {
+        (Shape::Mesh(_), Shape::Mesh(mesh)) if is_coarse_sheet(mesh, a.shape) => {
+            let told = Told { X_WM: b.X_W, mesh_is_a: false, part: 1.0, found };
+            against(mesh, a.shape, a.X_W, reach_m, memory, told);
+        }
         (Shape::Mesh(mesh), other) => {
             let told = Told { X_WM: a.X_W, mesh_is_a: true, part: 1.0, found };
             against(mesh, other, b.X_W, reach_m, memory, told);
@@ -37,6 +41,13 @@ pub(super) fn contact_points(
         }
         _ => {}
     }
+}
+
+/// True for a sheet of fewer faces than another mesh: places are sought on the faces of the first one, and those of a room are
+/// looked at in time where those of a thing within it are not.
+fn is_coarse_sheet(mesh: &Mesh, other: &Shape) -> bool {
+    let Shape::Mesh(other) = other else { return false };
+    mesh.sides() == Sides::Sheet && mesh.faces().len() < other.faces().len()
 }
 
 /// Whether contact points of such a mesh as A can be found.

@@ -2,7 +2,7 @@
 //!
 //! Frames: everything in the mesh's frame M, in which the other one is placed.
 
-use haptics::mesh::{Linear, Mesh};
+use haptics::mesh::{Linear, Mesh, Sides};
 use haptics::{Form, Surface};
 use nalgebra::{Isometry3, Point3, Vector3};
 
@@ -49,6 +49,11 @@ impl Meeting {
     /// What may be this deep was not there a tick ago, unless it was deep then.
     pub(super) fn deep_m(&self) -> f64 {
         if self.depth_m > 0.0 { 1.5 * self.depth_m + 2.0 * self.travel_m } else { 0.0 }
+    }
+
+    /// So deep in a sheet may be what has come through it here: all else is on its other side, and was.
+    pub(super) fn deep_in_sheet_m(&self) -> f64 {
+        1.5 * self.depth_m + 2.0 * self.travel_m + BEGUN_M
     }
 
     /// The square across the normal that something covers, by how far it reaches in a direction: what is outside of it cannot
@@ -120,6 +125,11 @@ impl Other<'_> {
         let turned = |v: &Vector3<f64>| self.X_MO.inverse_transform_vector(v);
         let side = Side { lift: turned(&side.lift), along: turned(&side.along), ..*side };
         see_side(mesh, &point, &side).map(|seen| Seen { out: self.X_MO * seen.out, gap_m: seen.gap_m })
+    }
+
+    /// It has no inside.
+    pub(super) fn is_sheet(&self) -> bool {
+        matches!(self.solid, Solidity::Mesh(mesh) if mesh.sides() == Sides::Sheet)
     }
 
     pub(super) fn is_convex(&self) -> bool {
@@ -246,5 +256,7 @@ fn seen_from(of_M: &Linear, X_MO: &Isometry3<f64>) -> Linear {
     Linear { along_B: along, base: of_M.base + of_M.along_B.dot(&X_MO.translation.vector), ..*of_M }
 }
 
+/// So deep in a sheet may lie what lies there from the beginning \[m\].
+const BEGUN_M: f64 = 2e-3;
 /// Sine of a way to the axis from which on it is the side that looks there.
 const UPRIGHT: f64 = 0.7;

@@ -16,6 +16,7 @@ use nalgebra::{Isometry3, Vector3};
 
 use super::mesh_other::Other;
 use super::mesh_patch::{MAX_PATCHES, Patch, Patches, Searched};
+use super::mesh_see::Seen;
 
 /// Finds all places anew, if the two have moved since they were sought.
 pub(super) fn look_around(
@@ -242,10 +243,21 @@ fn nearest_to(mesh: &Mesh, number: u32, other: &Other<'_>, radius_m: f64, within
     if seen.gap_m > within_m || seen.gap_m < -DEEP_M || faces < FACES {
         return None;
     }
+    if other.is_sheet() && seen.gap_m < 0.0 && !has_come_through(mesh, &at_M, &seen) {
+        return None;
+    }
     if feature == Feature::Face {
         return Some(Place { normal_M: of_face_M, at_M, gap_m: seen.gap_m, ..Place::default() });
     }
     Some(Place { normal_M: -seen.out, at_M, gap_m: seen.gap_m, is_edge: true, number: None })
+}
+
+/// True for a point of a mesh that has come through a sheet: all from it to the sheet, and as far beyond, is inside of the
+/// mesh. Else another side of the mesh is nearer to the sheet, which has no inside that could tell.
+fn has_come_through(mesh: &Mesh, at_M: &Vector3<f64>, seen: &Seen) -> bool {
+    let way_M = seen.out * -seen.gap_m;
+    let [beyond_M, behind_M] = [2.0, LITTLE].map(|share| at_M + way_M * share);
+    mesh.is_inside(&beyond_M) && mesh.first_hit(&beyond_M, &behind_M).is_none()
 }
 
 /// So much farther than reach is sought \[m\]: so far may two move until the next search.
@@ -261,6 +273,8 @@ const DEEP_M: f64 = 2e-3;
 /// Cosine between what looks at each other.
 const FACES: f64 = 0.1;
 const ROUNDING: f64 = 1e-6;
+/// Of a way, off its ends.
+const LITTLE: f64 = 1e-2;
 /// Turns between a face and the other one.
 const TO_AND_FRO: usize = 3;
 /// Nodes and runs of the hierarchy that are looked at.

@@ -14,11 +14,13 @@
 //! Of all that is found, what [carries](super::mesh_carry) counts.
 //! Limits: six places a pair. Crossings are found of a box's edges, of the lines along which cylinders, cones and capsules
 //! touch, and of sharp edges that leave the vertices of a mesh that were chosen: of fine meshes these are short, but vertices
-//! lie as near. Rims of round forms are not cut off.
+//! lie as near. Rims of round forms are not cut off. A sheet has no inside: what is far behind it is taken for what has always
+//! been there, and limbs that are thin beside the way of a tick are lost now and then (of finely cut things that fell on sheets
+//! or flew about in rooms of triangles, 15 of 1800).
 //! Cost: for each place two choices of vertices and at most eight queries for the nearest point for each side; and a search
 //! when the two have moved by a millimetre; bounded.
 
-use haptics::mesh::{Linear, Mesh};
+use haptics::mesh::{Linear, Mesh, Sides};
 use nalgebra::{Point3, Vector3};
 
 use super::PairMemory;
@@ -98,8 +100,17 @@ fn meet(mesh: &Mesh, other: &Other<'_>, reach_m: f64, patches: &mut Patches) -> 
     let [low_M, high_M] = mesh.bounds_B();
     // Out of the larger one is where the smaller one's middle is.
     let is_smaller = 0.5 * (high_M - low_M).norm() < radius_m;
+    let middle_M = (low_M + high_M) * 0.5;
     let out_M = |at_M: &Vector3<f64>| {
-        let out_M = if is_smaller { (low_M + high_M) * 0.5 - at_M } else { at_M - centre_M };
+        let out_M = match (other.is_sheet(), is_smaller) {
+            // Of a sheet, from where it is there to the middle: it has no inside that could tell.
+            (true, _) => {
+                let seen = other.see(at_M, &Vector3::y(), 0.0);
+                middle_M - (at_M - seen.out * seen.gap_m)
+            }
+            (false, true) => middle_M - at_M,
+            (false, false) => at_M - centre_M,
+        };
         out_M.try_normalize(0.0).unwrap_or_else(Vector3::y)
     };
     let mut seen = other.see(&at_M, &out_M(&at_M), 0.0);
@@ -165,7 +176,7 @@ impl Place<'_> {
         };
         for corner in chosen.into_iter().flatten().filter(counts) {
             let on_mesh_M = *corner.point_M(mesh);
-            let seen = self.of_vertex(&on_mesh_M);
+            let Some(seen) = self.of_vertex(&on_mesh_M) else { continue };
             if !self.patches.are_several() || corner.looks(mesh, &-seen.out) {
                 let about = About::Vertex(corner.vertex(mesh));
                 self.push(Contact::new(about, on_mesh_M, -seen.out, seen.gap_m));
@@ -192,18 +203,27 @@ impl Place<'_> {
         if self.number == 0 { BEHIND_M.max(0.5 * radius_m) } else { BEHIND_M }
     }
 
-    fn of_vertex(&self, at_M: &Vector3<f64>) -> Seen {
+    fn of_vertex(&self, at_M: &Vector3<f64>) -> Option<Seen> {
         let along_M = -self.meeting.normal_M;
-        self.side(at_M, along_M, -1.0, 0.0)
+        let seen = self
+            .side(at_M, along_M, -1.0, 0.0)
             .and_then(|side| self.other.see_side(at_M, &side))
-            .unwrap_or_else(|| self.other.see(at_M, &along_M, self.meeting.deep_m()))
+            .unwrap_or_else(|| self.other.see(at_M, &along_M, self.meeting.deep_m()));
+        self.has_come_through(seen, self.other.is_sheet(), 0.0)
     }
 
-    fn of_own(&self, own: &Own) -> Seen {
+    fn of_own(&self, own: &Own) -> Option<Seen> {
         let along_M = self.meeting.normal_M;
-        self.side(&own.at_M, along_M, 1.0, own.radius_m)
+        let seen = self
+            .side(&own.at_M, along_M, 1.0, own.radius_m)
             .and_then(|side| see_side(self.mesh, &own.at_M, &side))
-            .unwrap_or_else(|| see(self.mesh, &own.at_M, &along_M, self.meeting.deep_m()))
+            .unwrap_or_else(|| see(self.mesh, &own.at_M, &along_M, self.meeting.deep_m()));
+        self.has_come_through(seen, self.mesh.sides() == Sides::Sheet, own.radius_m)
+    }
+
+    /// What is deeper in a sheet than anything can have come is not in it, but beyond.
+    fn has_come_through(&self, seen: Seen, is_sheet: bool, radius_m: f64) -> Option<Seen> {
+        (!is_sheet || seen.gap_m - radius_m >= -self.meeting.deep_in_sheet_m()).then_some(seen)
     }
 
     /// The side that is looked at here, if others are pressed, too.
@@ -258,7 +278,7 @@ impl Place<'_> {
             if mesh.clearance(&own.at_M, own.radius_m + far_m) >= own.radius_m + far_m {
                 continue;
             }
-            let seen = self.of_own(&own);
+            let Some(seen) = self.of_own(&own) else { continue };
             if self.patches.are_several() && !other.looks(&own, &-seen.out) {
                 continue;
             }

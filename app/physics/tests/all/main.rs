@@ -48,6 +48,7 @@ mod meshes_mass;
 mod meshes_oracle;
 mod meshes_places;
 mod meshes_plane;
+mod meshes_sheets;
 mod no_allocation;
 mod pulls;
 mod put;

@@ -1,0 +1,89 @@
+//! Finely cut things with limbs on sheets and in rooms of triangles, which have no inside: they stay on their side.
+#![allow(non_snake_case)]
+
+use crate::{common, meshes};
+
+use common::{body, object};
+use haptics::Shape;
+use haptics::mesh::{Mesh, make};
+use meshes::build;
+use nalgebra::{Isometry3, UnitQuaternion, Vector3};
+use physics::{ContactStiffness, Manipulation, Settings};
+use std::sync::Arc;
+
+const MASS_KG: f64 = 0.1;
+const ROOM_M: f64 = 0.3;
+
+/// Six limbs of different lengths about a trunk, of 5000 faces.
+fn limbs() -> Shape {
+    let mut soup = make::uv_sphere(72, 37, 1.0);
+    let limbs = [
+        ([0.6, -0.8, 0.3], 1.0),
+        ([-0.6, -0.8, 0.4], 0.9),
+        ([0.5, -0.8, -0.5], 1.0),
+        ([-0.5, -0.7, -0.5], 0.8),
+        ([0.9, 0.5, 0.1], 0.9),
+        ([-0.9, 0.1, 0.2], 1.1),
+    ];
+    for vertex in &mut soup.vertices {
+        let way = vertex.normalize();
+        let limb = |(along, length): &([f64; 3], f64)| {
+            length * (40.0 * (way.dot(&Vector3::from(*along).normalize()) - 1.0)).exp()
+        };
+        *vertex = way * 0.032 * (0.25 + limbs.iter().map(limb).fold(0.0, f64::max));
+    }
+    build(soup).into()
+}
+
+/// Number of those that left, of things that fall or fly in all directions.
+fn escaped(wall: &Shape, cases: u32, begin: impl Fn(&mut dyn FnMut() -> f64) -> [Vector3<f64>; 2]) -> u32 {
+    let thing = limbs();
+    let mut seed = 7_u64;
+    let mut random = move || {
+        seed = seed.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        (seed >> 33) as f64 / f64::from(1_u32 << 31) * 2.0 - 1.0
+    };
+    let mut left = 0;
+    for _ in 0..cases {
+        let turn = UnitQuaternion::from_scaled_axis(Vector3::from_fn(|_, _| random()) * 3.0);
+        let [at, velocity_W] = begin(&mut random);
+        let X_WB = Isometry3::from_parts(at.into(), turn);
+        let wall = object(wall.clone(), Isometry3::identity(), 1000.0, 0.5);
+        let mut entities = vec![wall, object(thing.clone(), X_WB, 1000.0, 0.5)];
+        let mut body = body(&entities[1], MASS_KG);
+        body.velocity_W = velocity_W;
+        let contact_stiffness = ContactStiffness::ByMass { damping_ratio: 1.0 };
+        let settings = Settings { contact_stiffness, ..Settings::default() };
+        let mut manipulation = Manipulation::new(&entities, &[(1, body)], settings).unwrap();
+        for _ in 0..800 {
+            manipulation.step(&mut entities, &mut [], 1e-3);
+        }
+        // What has left is below by now, or beside and on its way down.
+        let at = manipulation.bodies()[0].centre_W;
+        left += u32::from(at.y < 0.0 || at.xz().amax() > 0.5 * ROOM_M);
+    }
+    left
+}
+
+/// Thin limbs may be lost, see the limits in `mesh_solid.rs`: one of sixty, where six were.
+#[test]
+fn hardly_anything_with_limbs_falls_through_a_sheet() {
+    let quad = build(meshes::terrain(1, 2.0, |_, _| 0.0));
+    let left = escaped(&quad.into(), 60, |random| {
+        [Vector3::new(0.02 * random(), 0.1 + 0.04 * random(), 0.02 * random()), Vector3::zeros()]
+    });
+    assert!(left <= 1, "{left}");
+}
+
+/// A few of a hundred, where a fifth did.
+#[test]
+fn hardly_anything_with_limbs_leaves_a_room_of_triangles() {
+    let mut soup = make::cuboid([ROOM_M; 3]);
+    soup.vertices.iter_mut().for_each(|vertex| vertex.y += 0.5 * ROOM_M);
+    let room = Arc::new(Mesh::build(soup).unwrap().0.into_sheet());
+    let left = escaped(&room.into(), 100, |random| {
+        let at = Vector3::new(0.02 * random(), 0.12 + 0.02 * random(), 0.02 * random());
+        [at, Vector3::from_fn(|_, _| 1.5 * random())]
+    });
+    assert!(left <= 5, "{left}");
+}
