@@ -635,12 +635,23 @@ mod tests {
 
     /// Sends a request as this user; the answer.
     fn ask(server: &mut Server, memory: &DriverMemory, uid: u32, kind: RequestKind) -> (UnixStream, Verdict) {
+        ask_and_hear(server, memory, uid, kind, &mut Vec::new())
+    }
+
+    /// The same, with what the driver is told.
+    fn ask_and_hear(
+        server: &mut Server,
+        memory: &DriverMemory,
+        uid: u32,
+        kind: RequestKind,
+        events: &mut Vec<ServerEvent>,
+    ) -> (UnixStream, Verdict) {
         let (mut far, near) = UnixStream::pair().unwrap();
         near.set_nonblocking(true).unwrap();
         let peer = Peer { uid, ..Peer::of(far.as_fd()).unwrap() };
         server.connections.push(Connection::new(near, peer));
         far.write_all(bytemuck::bytes_of(&Request::new(kind, "test"))).unwrap();
-        server.listen_to(server.connections.len() - 1, memory, &mut Vec::new());
+        server.listen_to(server.connections.len() - 1, memory, events);
         server.forget_the_gone();
         let mut answer = Answer::zeroed();
         far.read_exact(bytemuck::bytes_of_mut(&mut answer)).unwrap();
@@ -689,6 +700,78 @@ mod tests {
         assert_eq!(granted, Verdict::Granted, "time enough");
         // Who lets one lapse gets none from others until they had time enough.
         assert_eq!(command(one).1, Verdict::LeaseHeld);
+    }
+
+    #[test]
+    #[cfg_attr(miri, ignore = "sockets are the system's")]
+    fn an_offer_that_was_taken_away_is_told_but_not_again_of_who_lets_every_one_lapse() {
+        let directory = tempfile::tempdir().unwrap();
+        let mut server = Server::bind(&directory.path().join("driver.sock")).unwrap();
+        let memory = DriverMemory::create(&driver_info()).unwrap();
+        let owner = server.rights.owner;
+        let [one, other, third] = [1, 2, 3].map(|more| owner + more);
+        let mut far = Vec::new();
+        // Who asks, whether the one before had time enough, whether it is told, and who has lapsed by then.
+        let steps = [
+            (one, false, false, vec![]),
+            (other, true, true, vec![one]),
+            (one, true, true, vec![one, other]),
+            (other, true, false, vec![one, other]),
+            (owner, false, false, vec![one, other]),
+        ];
+        for (number, (uid, waits, is_told, lapsed)) in steps.into_iter().enumerate() {
+            if waits {
+                std::thread::sleep(MAPPED_WITHIN + Duration::from_millis(20));
+            }
+            let mut events = Vec::new();
+            let (stream, granted) =
+                ask_and_hear(&mut server, &memory, uid, RequestKind::Command, &mut events);
+            far.push(stream);
+            assert_eq!(granted, Verdict::Granted, "{number}");
+            let words = "has not taken the lease that it was offered, and loses it to";
+            let tells = |event: &ServerEvent| matches!(event, ServerEvent::Trouble { message } if message.contains(words));
+            assert_eq!(events.iter().any(tells), is_told, "{number}: {events:?}");
+            let has_lapsed: Vec<_> = [one, other, third, owner]
+                .into_iter()
+                .filter(|uid| server.lapsed.contains(Some(*uid)))
+                .collect();
+            assert_eq!(has_lapsed, lapsed, "{number}");
+        }
+        // Of whom an administrator takes it that is told, and he has done nothing wrong.
+        server.connections.clear();
+        let (_third, granted) = ask(&mut server, &memory, third, RequestKind::Command);
+        assert_eq!(granted, Verdict::Granted);
+        let mut events = Vec::new();
+        let (_owner, granted) = ask_and_hear(&mut server, &memory, owner, RequestKind::Command, &mut events);
+        assert_eq!((granted, events.len()), (Verdict::Granted, 1));
+        assert!(!server.lapsed.contains(Some(third)));
+    }
+
+    /// One that was not mapped has lapsed; one that was, and only waits for another's to be sealed, has not.
+    #[test]
+    #[cfg_attr(miri, ignore = "sockets are the system's")]
+    fn an_offer_that_is_overdue_has_lapsed_but_for_one_that_waits_for_others() {
+        let directory = tempfile::tempdir().unwrap();
+        let mut server = Server::bind(&directory.path().join("driver.sock")).unwrap();
+        let users = [1, 2].map(|more| server.rights.owner + more);
+        let mut kept = Vec::new();
+        for (uid, is_mapped) in users.into_iter().zip([false, true]) {
+            let (far, near) = UnixStream::pair().unwrap();
+            let peer = Peer { uid, ..Peer::of(far.as_fd()).unwrap() };
+            let offer = LeaseOffer::create(1, crate::layout::ABI_VERSION).unwrap();
+            let memory = is_mapped.then(|| crate::CommanderMemory::map(offer.fd()).unwrap());
+            let mut connection = Connection::new(near, peer);
+            let (process, offer) = (Process::Unknown, Some(Offer::Made(offer)));
+            connection.served(Stage::Commanding { lease: 1, name: "test".into(), process, offer });
+            server.connections.push(connection);
+            kept.push((far, memory));
+        }
+        std::thread::sleep(crate::segment::TAKEN_WITHIN + Duration::from_millis(50));
+        let mut events = Vec::new();
+        server.drop_the_silent(&mut events);
+        assert_eq!(events.len(), 2, "{events:?}");
+        assert!(server.connections.iter().all(Connection::is_gone));
+        assert_eq!(users.map(|uid| server.lapsed.contains(Some(uid))), [true, false]);
     }
 
     /// Sends requests to command as two users, one of whom has no place to command from.

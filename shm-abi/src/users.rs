@@ -66,4 +66,10 @@ mod tests {
         }
         assert_eq!(shared_number_of("", ""), Some(65_534), "nothing can be read");
     }
+
+    #[test]
+    fn a_user_is_told_by_its_number_if_that_is_its_own() {
+        assert_eq!(UserWords(Some(7)).to_string(), "user 7");
+        assert_eq!(UserWords(None).to_string(), "a user of another namespace");
+    }
 }
