@@ -75,7 +75,9 @@ impl Drop for Opened {
     fn drop(&mut self) {
         // Should it be gone already, so much the better.
         let _ = match &self.before {
-            Before::Absent(path) => std::fs::remove_file(path),
+            // Somebody may have put another one there.
+            Before::Absent(path) if is_itself(&self.file, path) => std::fs::remove_file(path),
+            Before::Absent(_) => Ok(()),
             Before::Empty => self.file.set_len(0),
             Before::Content => self.changed.take().map_or(Ok(()), |changed| self.give_room_back(changed)),
             Before::Stays => Ok(()),
@@ -391,6 +393,13 @@ fn is_at(file: &File, path: &Path) -> bool {
     }
 }
 
+/// The name is that of this file, and not of a link to it.
+fn is_itself(file: &File, path: &Path) -> bool {
+    let identity = |found: Metadata| (found.dev(), found.ino());
+    let named = path.symlink_metadata().map(identity);
+    named.is_ok_and(|named| file.metadata().map(identity).is_ok_and(|open| open == named))
+}
+
 /// The file, and its name if it was not there.
 fn open_or_make(path: &Path) -> io::Result<(File, Option<PathBuf>)> {
     let mut options = OpenOptions::new();
@@ -490,6 +499,24 @@ mod tests {
         assert!(found().1 >= before.1);
         drop(opened);
         assert_eq!(found(), before);
+    }
+
+    #[test]
+    fn a_file_that_others_put_in_the_place_of_one_that_was_made_for_nothing_stays() {
+        let directory = tempfile::tempdir().expect("a directory");
+        let [new, moved, other] = ["new", "moved", "other"].map(|name| directory.path().join(name));
+        for is_moved in [true, false] {
+            std::fs::write(&other, "another's").expect("room");
+            let opened = Opened::open(&new).expect("opened");
+            if is_moved {
+                std::fs::rename(&new, &moved).expect("our own");
+            }
+            std::fs::rename(&other, &new).expect("our own");
+            drop(opened);
+            assert_eq!(std::fs::read(&new).expect("there"), b"another's");
+            assert_eq!(moved.exists(), is_moved);
+            [&new, &moved].map(std::fs::remove_file).into_iter().filter_map(Result::err).for_each(drop);
+        }
     }
 
     #[test]
