@@ -7,7 +7,7 @@
 pub use crate::columns::Names;
 use crate::columns::{Cell, columns, each_cell};
 use crate::record::destination::{FormatError, STANDARD_OUTPUT, shown};
-use crate::record::{ContentState, Opened, WholeLines};
+use crate::record::{Content, ContentState, Opened, WholeLines};
 use crate::row::{BodyRow, Row};
 use io_driver::device::run_time_s;
 use std::fmt::Write as _;
@@ -67,6 +67,20 @@ pub enum RecordingError {
         /// The system's error.
         source: io::Error,
     },
+    /// Nor did it, and behind the earlier content is some by which room was tried.
+    #[error(
+        "cannot write the recording {file}: {}; the run goes on without it; behind the earlier content of the file are {bytes} \
+         bytes that could not be cut off",
+        rt_core::limits::with_remedy(.source)
+    )]
+    Noise {
+        /// Which.
+        file: PathBuf,
+        /// The system's error.
+        source: io::Error,
+        /// Length of the noise.
+        bytes: u64,
+    },
     /// The same of a file of events.
     #[error("{}", .0.to_string().replacen("the recording", "the file of events", 1))]
     OfEvents(Box<RecordingError>),
@@ -92,6 +106,30 @@ impl RecordingError {
         Self::OfEvents(Box::new(self))
     }
 
+    /// Refusal of a write to a file that is complete up to the last of so many rows, by what the file has now.
+    pub(crate) fn of_write(
+        file: &Path,
+        source: io::Error,
+        content: &ContentState,
+        (until_s, rows): (f64, u64),
+    ) -> Self {
+        let file = file.to_owned();
+        match content.load() {
+            Content::Earlier => Self::NotBegun { file, source },
+            Content::Noisy => Self::Noise { file, source, bytes: content.noise_bytes() },
+            _ => Self::Write { file, source, until_s, rows },
+        }
+    }
+
+    /// The same when nothing is behind the earlier content any more.
+    pub(crate) fn without_noise(self) -> Self {
+        match self {
+            Self::Noise { file, source, .. } => Self::NotBegun { file, source },
+            Self::OfEvents(error) => error.without_noise().of_events(),
+            other => other,
+        }
+    }
+
     /// Failure of the write, of whichever kind of file.
     pub fn cause(&self) -> &Self {
         if let Self::OfEvents(error) = self { error.cause() } else { self }
@@ -113,6 +151,7 @@ impl RecordingError {
             | Self::Claimed { file }
             | Self::Removed { file, .. }
             | Self::NotBegun { file, .. }
+            | Self::Noise { file, .. }
             | Self::Write { file, .. } => file,
             Self::OfEvents(error) => error.file(),
             Self::Format(FormatError::Unknown { file, .. } | FormatError::ParquetOfRun { file, .. }) => file,
@@ -224,11 +263,8 @@ impl Recording {
     }
 
     fn failed(&self, source: io::Error) -> RecordingError {
-        if self.lines.has_content() {
-            return RecordingError::NotBegun { file: self.path.clone(), source };
-        }
         let until_s = run_time_s(self.lines.last_tick().cast_signed(), self.period_ns);
-        RecordingError::Write { file: self.path.clone(), source, until_s, rows: self.lines.rows() }
+        RecordingError::of_write(&self.path, source, &self.content(), (until_s, self.lines.rows()))
     }
 }
 

@@ -97,11 +97,8 @@ impl EventsFile {
     }
 
     fn failed(&self, source: io::Error) -> RecordingError {
-        if self.lines.has_content() {
-            return RecordingError::NotBegun { file: self.path.clone(), source }.of_events();
-        }
         let until_s = run_time_s(self.lines.last_tick().cast_signed(), self.period_ns);
-        RecordingError::Write { file: self.path.clone(), source, until_s, rows: self.lines.rows() }
-            .of_events()
+        let rows = self.lines.rows();
+        RecordingError::of_write(&self.path, source, &self.content(), (until_s, rows)).of_events()
     }
 }

@@ -381,11 +381,7 @@ impl McapFile {
     }
 
     fn failed(&self, error: McapError) -> RecordingError {
-        let (file, source, until_s, rows) = (self.path.clone(), into_io(error), self.until_s(), self.rows);
-        if self.beginning.has_content.load(Ordering::Relaxed) {
-            return RecordingError::NotBegun { file, source };
-        }
-        RecordingError::Write { file, source, until_s, rows }
+        RecordingError::of_write(&self.path, into_io(error), &self.content, (self.until_s(), self.rows))
     }
 }
 

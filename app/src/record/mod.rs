@@ -29,7 +29,7 @@ mod wire;
 
 pub use about::{About, Beginning, InputFile};
 pub use backpressure::Backpressure;
-pub(crate) use content::ContentState;
+pub(crate) use content::{Content, ContentState};
 pub use events_file::EventsFile;
 pub use files::Files;
 pub use mcap_file::McapFile;

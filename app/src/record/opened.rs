@@ -7,11 +7,12 @@
 //! is reserved then ([`Opened::start`]); that its beginning alone will fit is found out before the run
 //! ([`Opened::reserve`]). The piece is written over the content, in whose room and the reserved one it lies: also on a disk
 //! that others fill meanwhile. File systems that copy what is written over (btrfs) or that reserve nothing may refuse the piece
-//! itself: there the room for it, and for the content once more, is tried in a file without a name beside it first. The rest of
-//! the content is cut off behind the piece and not before; what was written over is put back if anything is refused. Until then
-//! the first byte is [`HALF_REPLACED`], so that nobody takes what a killed process leaves for one recording. Any other file
-//! begins at once.
-//! Invariant: what was opened and not started is as it was: a file that was made here is removed again.
+//! itself: there the room for it, and for the content once more, is tried in a file without a name beside it first, or, where
+//! there can be none, in noise behind the content, which is cut off again. The rest of the content is cut off behind the piece
+//! and not before; what was written over is put back if anything is refused. Until then the first byte is [`HALF_REPLACED`], so
+//! that nobody takes what a killed process leaves for one recording. Any other file begins at once.
+//! Invariant: what was opened and not started is as it was: a file that was made here is removed again. Noise that could not be
+//! cut off is told, and cut off with this value if that is possible by then.
 
 use super::content::{Content, ContentState};
 use super::destination::{is_standard_output, shown};
@@ -23,7 +24,7 @@ use rustix::termios::isatty;
 use std::cell::Cell;
 use std::fs::{File, Metadata, OpenOptions};
 use std::io::{self, Read, Seek, Write};
-use std::os::fd::{AsFd, AsRawFd};
+use std::os::fd::{AsFd, AsRawFd, OwnedFd};
 use std::os::unix::fs::{FileExt, FileTypeExt, MetadataExt};
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, PoisonError};
@@ -43,6 +44,8 @@ pub struct Opened {
     before: Before,
     /// Last change of the content before room was reserved behind it, if some was, and that by the reserving.
     changed: Cell<Option<[SystemTime; 2]>>,
+    /// Length of the content, and with noise behind it that could not be cut off.
+    noisy: Cell<Option<[u64; 2]>>,
     content: Arc<ContentState>,
 }
 
@@ -79,7 +82,9 @@ impl Drop for Opened {
             Before::Absent(path) if is_itself(&self.file, path) => std::fs::remove_file(path),
             Before::Absent(_) => Ok(()),
             Before::Empty => self.file.set_len(0),
-            Before::Content => self.changed.take().map_or(Ok(()), |changed| self.give_room_back(changed)),
+            Before::Content => self
+                .cut_noise()
+                .and_then(|()| self.changed.take().map_or(Ok(()), |changed| self.give_room_back(changed))),
             Before::Stays => Ok(()),
         };
     }
@@ -119,7 +124,8 @@ impl Opened {
     fn with(file: File, path: &Path, before: Before) -> Self {
         let content = if before == Before::Content { Content::Earlier } else { Content::Replaced };
         let content = Arc::new(ContentState::new(content));
-        Self { file, path: path.into(), before, changed: Cell::default(), content }
+        let (changed, noisy) = (Cell::default(), Cell::default());
+        Self { file, path: path.into(), before, changed, noisy, content }
     }
 
     /// As [`Self::open`], for a recording.
@@ -208,28 +214,42 @@ impl Opened {
     /// Writes a first piece over the content, and gives up the rest of that; the file stays from now on, whatever becomes of it.
     ///
     /// # Errors
-    /// Refusal by the system: the file has its content as before, or if even that is refused, nothing.
+    /// Refusal by the system: the file has its content as before, perhaps with noise behind it, or if even that is refused,
+    /// nothing; [`ContentState`] tells which.
     pub(super) fn replace_content(&mut self, piece: &[u8]) -> io::Result<()> {
-        match self.replace_and_cut(piece, || self.cut(piece.len() as u64)) {
-            Ok(()) => {
-                self.before = Before::Stays;
-                self.content.store(Content::Replaced);
-                Ok(())
-            }
-            Err(NotReplaced { why, is_as_before: true }) => {
-                self.content.store(Content::Earlier);
-                if let (Some([before, _]), Ok(found)) = (self.changed.get(), self.file.metadata()) {
-                    self.changed.set(found.modified().ok().map(|now| [before, now]));
-                }
-                Err(why)
-            }
-            Err(NotReplaced { why, is_as_before: false }) => {
-                self.before = Before::Stays;
-                self.content.store(Content::Lost);
-                self.cut(0)?;
-                Err(io::Error::new(why.kind(), format!("{why}; its earlier content is lost")))
-            }
+        let replaced = self.replace_and_cut(piece, || self.cut(piece.len() as u64));
+        let now = replaced.as_ref().err().map_or(Content::Replaced, |refused| refused.left);
+        self.content.store(now);
+        if let Content::Earlier | Content::Noisy = now {
+            self.changed_itself();
+        } else {
+            self.before = Before::Stays;
         }
+        let Err(NotReplaced { why, left }) = replaced else { return Ok(()) };
+        if left != Content::Lost {
+            return Err(why);
+        }
+        self.cut(0)?;
+        Err(io::Error::new(why.kind(), format!("{why}; its earlier content is lost")))
+    }
+
+    /// The last change of the content is none by others.
+    fn changed_itself(&self) {
+        if let (Some([before, _]), Ok(found)) = (self.changed.get(), self.file.metadata()) {
+            self.changed.set(found.modified().ok().map(|now| [before, now]));
+        }
+    }
+
+    /// Another try at noise that could not be cut off, unless others have changed the file since.
+    fn cut_noise(&self) -> io::Result<()> {
+        let Some([length, noisy]) = self.noisy.take() else { return Ok(()) };
+        if self.file.metadata()?.len() == noisy {
+            self.file.set_len(length)?;
+            self.changed_itself();
+            self.content.store_noise(0);
+            self.content.store(Content::Earlier);
+        }
+        Ok(())
     }
 
     /// Its content, to be looked at from another thread.
@@ -239,27 +259,28 @@ impl Opened {
 
     /// Writes the piece over the content, has the rest cut off, and puts the first byte.
     fn replace_and_cut(&self, piece: &[u8], cut: impl FnOnce() -> io::Result<()>) -> Result<(), NotReplaced> {
-        let as_before = |why| NotReplaced { why, is_as_before: true };
-        let length = self.file.metadata().map_err(as_before)?.len();
+        let length = self.file.metadata().map_err(NotReplaced::at_all)?.len();
         let replaced = self.contents_first(piece.len());
         // Else others of this process take the room that is found.
         let lock = || ALONE.lock().unwrap_or_else(PoisonError::into_inner);
         let alone = (!self.keeps_reserved_room()).then(lock);
         if alone.is_some() {
-            self.try_room(piece, replaced.as_deref().unwrap_or_default()).map_err(as_before)?;
+            self.try_room(piece, replaced.as_deref().unwrap_or_default())?;
         }
-        let Some((first, rest)) = piece.split_first() else { return cut().map_err(as_before) };
-        self.content.store(Content::BeingReplaced);
+        self.content.begin(Content::BeingReplaced).map_err(NotReplaced::at_all)?;
+        let Some((first, rest)) = piece.split_first() else { return cut().map_err(NotReplaced::at_all) };
         let written = (&self.file).write_all(&[HALF_REPLACED]).and_then(|()| (&self.file).write_all(rest));
         if let Err(why) = written.and_then(|()| cut()) {
             let back = replaced.and_then(|replaced| self.put_back(&replaced, length));
-            return Err(NotReplaced { why, is_as_before: back.is_ok() });
+            return Err(NotReplaced::and_put_back(why, back.is_ok()));
         }
         self.file.write_all_at(&[*first], 0).map_err(|why| {
             // Of a longer one the rest is gone.
             let all = replaced.ok().filter(|replaced| replaced.len() as u64 == length);
-            let is_as_before = all.is_some_and(|replaced| self.put_back(&replaced, length).is_ok());
-            NotReplaced { why, is_as_before }
+            NotReplaced::and_put_back(
+                why,
+                all.is_some_and(|replaced| self.put_back(&replaced, length).is_ok()),
+            )
         })
     }
 
@@ -278,23 +299,41 @@ impl Opened {
 
     /// Finds out whether a piece can be written over the content, and that back, where room that is reserved is no promise: on
     /// file systems that copy what is written over, or that reserve none.
-    fn try_room(&self, piece: &[u8], replaced: &[u8]) -> io::Result<()> {
+    fn try_room(&self, piece: &[u8], replaced: &[u8]) -> Result<(), NotReplaced> {
         // What a file system takes for the first byte alone, which is written once more.
         let block = vec![HALF_REPLACED; BLOCK_BYTES];
-        if let Some(mut trial) = self.nameless_beside() {
-            return [piece, replaced, &block].into_iter().try_for_each(|part| trial.write_all(part));
+        if let Some(mut trial) = self.nameless_beside().map_err(NotReplaced::at_all)? {
+            let tried = [piece, replaced, &block].into_iter().try_for_each(|part| trial.write_all(part));
+            return tried.map_err(NotReplaced::at_all);
         }
-        // Where nobody may make a file, or it would be elsewhere: behind the content, which it ends like a copy that broke off.
-        let length = self.file.metadata()?.len();
+        self.try_room_behind([&block, piece, replaced], |length| self.cut(length))
+    }
+
+    /// The same where nobody may make a file, or it would be elsewhere: behind the content, which it ends like a copy that broke
+    /// off.
+    fn try_room_behind(
+        &self,
+        parts: [&[u8]; 3],
+        cut: impl FnOnce(u64) -> io::Result<()>,
+    ) -> Result<(), NotReplaced> {
+        let length = self.file.metadata().map_err(NotReplaced::at_all)?.len();
+        self.content.begin(Content::Noisy).map_err(NotReplaced::at_all)?;
         let mut at = length;
-        let tried = [block.as_slice(), piece, replaced].into_iter().try_for_each(|part| {
+        let tried = parts.into_iter().try_for_each(|part| {
             // No line of it.
             let noise: Vec<u8> = part.iter().map(|byte| byte | 0x80).collect();
             self.file.write_all_at(&noise, at)?;
             at += part.len() as u64;
             Ok(())
         });
-        self.cut(length).and(tried)
+        if let Err(uncut) = cut(length) {
+            let noisy = self.file.metadata().map_or(at, |found| found.len());
+            self.noisy.set(Some([length, noisy]));
+            self.content.store_noise(noisy.saturating_sub(length));
+            return Err(NotReplaced { why: tried.err().unwrap_or(uncut), left: Content::Noisy });
+        }
+        self.content.store(Content::Earlier);
+        tried.map_err(NotReplaced::at_all)
     }
 
     /// Writing over its content needs no room, and room that was reserved is there.
@@ -307,14 +346,17 @@ impl Opened {
         [EXT, XFS, TMPFS].contains(&kind) && fallocate(&self.file, FallocateFlags::KEEP_SIZE, 0, 1).is_ok()
     }
 
-    /// A file without a name on the same file system, in the same directory.
-    fn nameless_beside(&self) -> Option<File> {
-        let own = std::fs::read_link(format!("/proc/self/fd/{}", self.file.as_raw_fd())).ok()?;
+    /// A file without a name on the same file system, in the same directory; `None` where there can be none.
+    ///
+    /// # Errors
+    /// No room even for an empty one.
+    fn nameless_beside(&self) -> io::Result<Option<File>> {
+        let own = std::fs::read_link(format!("/proc/self/fd/{}", self.file.as_raw_fd()));
+        let Some(directory) = own.as_ref().ok().and_then(|own| own.parent()) else { return Ok(None) };
         let flags = OFlags::TMPFILE | OFlags::WRONLY;
-        let nameless = rustix::fs::open(own.parent()?, flags, Mode::RUSR | Mode::WUSR).ok()?;
-        let nameless = File::from(nameless);
+        let nameless = nameless(rustix::fs::open(directory, flags, Mode::RUSR | Mode::WUSR))?;
         let device = |file: &File| Some(file.metadata().ok()?.dev());
-        (device(&nameless) == device(&self.file)).then_some(nameless)
+        Ok(nameless.filter(|nameless| device(nameless) == device(&self.file)))
     }
 
     /// So many bytes of the content, or all of it if that is less.
@@ -326,7 +368,8 @@ impl Opened {
         Ok(first)
     }
 
-    fn cut(&self, bytes: u64) -> io::Result<()> {
+    /// Cuts it to so many bytes, if it has more.
+    pub(super) fn cut(&self, bytes: u64) -> io::Result<()> {
         if self.file.metadata()?.len() > bytes { self.file.set_len(bytes) } else { Ok(()) }
     }
 
@@ -351,8 +394,31 @@ impl Opened {
 #[derive(Debug)]
 struct NotReplaced {
     why: io::Error,
+    /// State that the file is in now.
+    left: Content,
+}
+
+impl NotReplaced {
     /// The content is there, to the byte.
-    is_as_before: bool,
+    fn at_all(why: io::Error) -> Self {
+        Self { why, left: Content::Earlier }
+    }
+
+    /// A part of it was written over.
+    fn and_put_back(why: io::Error, is_back: bool) -> Self {
+        Self { why, left: if is_back { Content::Earlier } else { Content::Lost } }
+    }
+}
+
+/// A file without a name; `None` if the system makes none here.
+///
+/// # Errors
+/// A full disk.
+fn nameless(made: Result<OwnedFd, Errno>) -> io::Result<Option<File>> {
+    match made {
+        Err(full @ (Errno::NOSPC | Errno::DQUOT)) => Err(full.into()),
+        made => Ok(made.ok().map(File::from)),
+    }
 }
 
 impl Before {
@@ -479,12 +545,66 @@ mod tests {
                 assert_eq!(read(), half);
                 Err(Errno::IO.into())
             });
-            assert!(refused.expect_err("refused").is_as_before);
+            assert_eq!(refused.expect_err("refused").left, Content::Earlier);
+            opened.content.store(Content::Earlier);
             assert_eq!(read(), content);
             opened.replace_content(b"new rows").expect("room");
             drop(opened);
             assert_eq!(read(), b"new rows");
         }
+    }
+
+    #[test]
+    fn a_disk_without_room_for_an_empty_file_is_a_refusal_and_one_that_makes_none_is_not() {
+        for full in [Errno::NOSPC, Errno::DQUOT] {
+            assert_eq!(nameless(Err(full)).expect_err("full").raw_os_error(), Some(full.raw_os_error()));
+        }
+        for other in [Errno::OPNOTSUPP, Errno::ACCESS, Errno::ISDIR] {
+            assert!(nameless(Err(other)).expect("not full").is_none());
+        }
+    }
+
+    #[test]
+    fn noise_behind_the_content_is_no_content_as_before_until_it_is_cut_off() {
+        let (_directory, path, opened) = with_content(b"earlier rows");
+        let content = opened.content();
+        let parts = [&b"block"[..], b"new rows", b"earlier rows"];
+        opened.reserve(8).expect("room");
+        let tried = opened.try_room_behind(parts, |length| {
+            assert_eq!((length, content.load()), (12, Content::Noisy));
+            assert_eq!(path.metadata().expect("there").len(), 12 + 25);
+            opened.cut(length)
+        });
+        tried.expect("room");
+        assert_eq!((content.load(), content.noise_bytes()), (Content::Earlier, 0));
+        let refused = opened.try_room_behind(parts, |_| Err(Errno::NOSPC.into())).expect_err("uncut");
+        assert_eq!(refused.left, Content::Noisy);
+        assert_eq!((content.load(), content.noise_bytes()), (Content::Noisy, 25));
+        let found = std::fs::read(&path).expect("readable");
+        assert!(found.starts_with(b"earlier rows") && found.len() == 12 + 25);
+        drop(opened);
+        assert_eq!(std::fs::read(&path).expect("readable"), b"earlier rows");
+        assert_eq!((content.load(), content.noise_bytes()), (Content::Earlier, 0));
+    }
+
+    #[test]
+    fn a_thread_that_was_left_behind_leaves_the_content_and_one_that_has_begun_does_not_count_as_such() {
+        let (_directory, path, mut opened) = with_content(b"earlier rows");
+        let content = opened.content();
+        assert_eq!(content.leave_behind(), Content::Earlier);
+        opened.replace_content(b"new").expect_err("left behind");
+        opened.try_room_behind([b"1"; 3], |_| panic!("nothing was written")).expect_err("left behind");
+        assert_eq!((content.load(), opened.has_content()), (Content::Earlier, true));
+        drop(opened);
+        assert_eq!(std::fs::read(&path).expect("readable"), b"earlier rows");
+        let opened = Opened::open(&path).expect("opened");
+        let content = opened.content();
+        let replaced = opened.replace_and_cut(b"new", || {
+            assert_eq!(content.leave_behind(), Content::BeingReplaced);
+            opened.cut(3)
+        });
+        replaced.expect("room");
+        assert_eq!(std::fs::read(&path).expect("readable"), b"new");
     }
 
     #[test]

@@ -6,7 +6,8 @@
 //! away: the run goes on. At the end the recorder has as long as it gets on; one that is stuck is given up. A reader of the
 //! standard output who has seen enough is no failure: the recording ends, and so may the run.
 //! Everything before the first row is written here, too, if it may have to wait for a reader.
-//! Invariant: on a clock that waits, a recording that lacks a row lacks all behind it, and says so.
+//! Invariants: on a clock that waits, a recording that lacks a row lacks all behind it, and says so. A thread that was left behind
+//! replaces no earlier content any more, which has been told as kept.
 
 use super::backpressure::{Backpressure, Progress, Wait};
 use super::content::{Content, ContentState};
@@ -165,8 +166,13 @@ impl Recorder {
         let content = file.content();
         let unit = if matches!(file, RecordFile::Events(_)) { EVENTS } else { "rows" };
         let (events, event_ends) = event_queue(MOST_EVENTS);
-        let writer =
-            RecorderThread { file: Some(file), events: event_ends, shared: shared.clone(), period_ns };
+        let writer = RecorderThread {
+            file: Some(file),
+            events: event_ends,
+            shared: shared.clone(),
+            content: Arc::clone(&content),
+            period_ns,
+        };
         let thread = std::thread::Builder::new()
             .name("recorder".into())
             .spawn(move || writer.run(receiver))
@@ -292,7 +298,11 @@ impl Recorder {
     /// Content of the file in words, while its thread is stuck.
     fn has_until_now(&self) -> String {
         match self.content.load() {
+            Content::Earlier if self.content.is_left_behind() => "the file is as it was".into(),
             Content::Earlier => "so far the file is as it was".into(),
+            Content::Noisy => {
+                "its earlier content is there, perhaps with bytes behind it by which room was tried".into()
+            }
             Content::BeingReplaced => "its earlier content may be lost".into(),
             Content::Lost => "its earlier content is lost".into(),
             Content::Replaced => {
@@ -400,7 +410,7 @@ impl Recorder {
     /// The thread ends with the process.
     fn leave_behind(self) -> Recorded {
         let (sent, lost) = self.sent_and_lost();
-        let is_as_before = self.content.load() == Content::Earlier;
+        self.content.leave_behind();
         let why = self.given_up.clone().unwrap_or_else(|| {
             let why = format!(
                 "cannot finish the recording {}: nothing was written for {} s; {}",
@@ -412,6 +422,8 @@ impl Recorder {
             why
         });
         let rows = self.shared.progress.written();
+        // From now on that stays so.
+        let is_as_before = self.content.load() == Content::Earlier;
         Recorded {
             path: self.path,
             rows,
@@ -448,6 +460,7 @@ struct RecorderThread {
     file: Option<RecordFile>,
     events: EventReceiver,
     shared: Arc<Shared>,
+    content: Arc<ContentState>,
     period_ns: u64,
 }
 
@@ -494,6 +507,8 @@ impl RecorderThread {
     /// Goes on without a file that takes no more; says how many rows it has, or what is wrong, which it tells.
     fn abandon(&mut self, error: RecordingError) -> Result<u64, RecordingError> {
         self.file = None;
+        // With the file went what could not be cut off of it, if that was possible by then.
+        let error = if self.content.load() == Content::Earlier { error.without_noise() } else { error };
         if let RecordingError::Write { rows, .. } = error.cause()
             && error.is_of_a_reader_who_left()
         {
@@ -502,6 +517,10 @@ impl RecorderThread {
         }
         if let RecordingError::NotBegun { .. } = error.cause() {
             self.shared.is_as_before.store(true, Ordering::Relaxed);
+            if self.content.is_left_behind() {
+                // Which has been told.
+                return Err(error);
+            }
         }
         say(format_args!("phantom3: {error}"));
         self.shared.has_failed.store(true, Ordering::Relaxed);
@@ -531,5 +550,41 @@ impl RecorderThread {
                 file.tell_lost(run_tick, count);
             }
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::columns::Names;
+    use crate::record::Opened;
+    use crate::recording::Recording;
+    use rt_core::signals::StopSignals;
+
+    /// As on a disk that stands still, and goes on while the run waits for another recording.
+    #[test]
+    fn a_recorder_that_goes_on_after_it_was_left_behind_leaves_the_earlier_recording() {
+        let directory = tempfile::tempdir().expect("a directory");
+        let path = directory.path().join("out.csv");
+        std::fs::write(&path, "earlier rows").expect("room");
+        let opened = Opened::recording(&path).expect("opened");
+        let file = RecordFile::Csv(Box::new(
+            Recording::begin(opened, Names::default(), 1_000_000).expect("nothing is written yet"),
+        ));
+        let patience = Duration::from_millis(100);
+        let how = Backpressure { patience, ..Backpressure::new(WhenFull::Wait, &StopSignals::default()) };
+        let mut recorder = Recorder::start(&path, file, 0, 1_000_000, how).expect("a thread");
+        let shared = Arc::clone(&recorder.shared);
+        // Its thread looks for gaps before each row.
+        let standing_still = shared.gaps();
+        for run_tick in 0..10 {
+            recorder.send(&Row { run_tick, ..Row::empty() }, &[]);
+        }
+        let recorded = recorder.finish();
+        assert!(recorded.is_left_behind && recorded.is_as_before);
+        assert!(recorded.failure.is_some_and(|words| words.ends_with("the file is as it was")));
+        drop(standing_still);
+        patience::until("the end of the thread", || Arc::strong_count(&shared) == 1);
+        assert_eq!(std::fs::read(&path).expect("there"), b"earlier rows");
     }
 }
