@@ -7,7 +7,7 @@
 pub use crate::columns::Names;
 use crate::columns::{Cell, columns, each_cell};
 use crate::record::destination::{FormatError, STANDARD_OUTPUT, shown};
-use crate::record::{Content, ContentState, Opened, WholeLines};
+use crate::record::{Content, ContentState, Opened, OtherLength, WholeLines};
 use crate::row::{BodyRow, Row};
 use io_driver::device::run_time_s;
 use std::fmt::Write as _;
@@ -55,6 +55,16 @@ pub enum RecordingError {
         file: PathBuf,
         /// Rows that were in it.
         rows: u64,
+    },
+    /// Somebody else cut or wrote it.
+    #[error(
+        "another process cut the recording {file} during the run, or wrote to it: {length}; nothing more is written to it"
+    )]
+    OtherLength {
+        /// Which.
+        file: PathBuf,
+        /// Length that it has, and that it should have.
+        length: OtherLength,
     },
     /// Its first piece would not fit.
     #[error(
@@ -114,6 +124,9 @@ impl RecordingError {
         (until_s, rows): (f64, u64),
     ) -> Self {
         let file = file.to_owned();
+        if let Some(length) = OtherLength::of(&source) {
+            return Self::OtherLength { file, length };
+        }
         match content.load() {
             Content::Earlier => Self::NotBegun { file, source },
             Content::Noisy => Self::Noise { file, source, bytes: content.noise_bytes() },
@@ -150,6 +163,7 @@ impl RecordingError {
             | Self::NoThread { file, .. }
             | Self::Claimed { file }
             | Self::Removed { file, .. }
+            | Self::OtherLength { file, .. }
             | Self::NotBegun { file, .. }
             | Self::Noise { file, .. }
             | Self::Write { file, .. } => file,

@@ -12,7 +12,8 @@
 //! Model: messages are encoded as Protocol Buffers and gathered into chunks of half a second of the run. A chunk goes to
 //! the file in one piece, so that whatever ends the process leaves all chunks before readable. Times are those of the
 //! run: 0 is its first tick.
-//! Invariant: what could not be written as a whole is cut off again; after that nothing more is written, not even an end.
+//! Invariants: what could not be written as a whole is cut off again; after that nothing more is written, not even an end, nor to
+//! a file that somebody else has cut or written.
 
 use super::about::{self, About};
 use super::content::ContentState;
@@ -331,13 +332,13 @@ impl McapFile {
         let end = Metadata { name: END.into(), metadata: facts };
         let closed = self.writer.write_metadata(&end).and_then(|()| self.writer.finish().map(drop));
         closed.map_err(|error| self.failed(error))?;
-        let (path, rows, until_s) = (self.path.clone(), self.rows, self.until_s());
+        let (path, content, rows, until_s) = (self.path.clone(), self.content(), self.rows, self.until_s());
         let whole = self.writer.into_inner().into_inner();
         let is_removed = whole.is_removed();
         match whole.sync() {
             Ok(()) if is_removed => Err(RecordingError::Removed { file: path, rows }),
             Ok(()) => Ok(rows),
-            Err(source) => Err(RecordingError::Write { file: path, source, until_s, rows }),
+            Err(source) => Err(RecordingError::of_write(&path, source, &content, (until_s, rows))),
         }
     }
 
@@ -501,7 +502,7 @@ impl WholeWrites {
         match self.file.file().sync_data() {
             // A pipe or a character device has no disk to reach.
             Err(error) if error.kind() == io::ErrorKind::InvalidInput => Ok(()),
-            synced => synced,
+            synced => synced.and_then(|()| self.file.check_length(self.written_bytes)),
         }
     }
 
@@ -525,7 +526,7 @@ impl WholeWrites {
             return;
         }
         // If even this fails, readers skip the last piece.
-        let _ = self.file.file().set_len(self.written_bytes);
+        let _ = self.file.cut(self.written_bytes);
         let _ = self.file.file().seek(SeekFrom::Start(self.written_bytes));
     }
 }
@@ -551,6 +552,11 @@ impl Write for WholeWrites {
             self.has_ended = true;
             return Err(refused);
         }
+        if !self.file.has_content() {
+            let length = self.file.check_length(self.written_bytes);
+            self.has_ended |= length.is_err();
+            length?;
+        }
         let written = self.write_whole(&pending);
         if written.is_err() {
             self.end();
@@ -563,6 +569,7 @@ impl Write for WholeWrites {
 
 #[cfg(test)]
 mod tests {
+    use super::super::opened::OtherLength;
     use super::*;
     use std::path::Path;
 
@@ -576,5 +583,29 @@ mod tests {
         full.file = Opened::open(&directory.path().join("end")).expect("a file");
         full.write_all(b"end").and_then(|()| full.flush()).expect_err("ended");
         assert_eq!(full.file.file().metadata().expect("a file").len(), 0);
+    }
+    #[test]
+    fn nothing_is_written_to_a_file_that_somebody_else_cut_or_wrote() {
+        let directory = tempfile::tempdir().expect("a directory");
+        let path = directory.path().join("chunks");
+        for content in ["", "ch", "chunks"] {
+            let opened = Opened::open(&path).expect("a file");
+            let mut whole = WholeWrites::new(opened, Arc::default());
+            whole.beginning.has_rows.store(true, Ordering::Relaxed);
+            whole.write_all(b"chunk").and_then(|()| whole.flush()).expect("room");
+            std::fs::write(&path, content).expect("room");
+            for _ in 0..2 {
+                whole.write_all(b"next").and_then(|()| whole.flush()).expect_err("another length");
+            }
+            whole.sync().expect_err("another length");
+            assert_eq!(std::fs::read_to_string(&path).expect("there"), content);
+            std::fs::remove_file(&path).expect("our own");
+        }
+        let opened = Opened::open(&path).expect("a file");
+        let mut whole = WholeWrites::new(opened, Arc::default());
+        whole.beginning.has_rows.store(true, Ordering::Relaxed);
+        whole.write_all(b"chunk").and_then(|()| whole.flush()).expect("room");
+        std::fs::write(&path, "").expect("room");
+        assert!(OtherLength::of(&whole.sync().expect_err("another length")).is_some());
     }
 }

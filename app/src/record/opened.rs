@@ -368,6 +368,23 @@ impl Opened {
         Ok(first)
     }
 
+    /// Finds out whether it is as long as what was written to it, if it is a file of this process alone. A hole or the bytes of
+    /// others would be taken for a part of the recording.
+    ///
+    /// # Errors
+    /// [`OtherLength`], of a file that somebody else has cut or written.
+    pub(super) fn check_length(&self, written_bytes: u64) -> io::Result<()> {
+        let length = || self.file.metadata().ok().filter(Metadata::is_file).map(|found| found.len());
+        let is_other = || length().filter(|length| *length != written_bytes);
+        if is_standard_output(&self.path) || is_other().is_none() {
+            return Ok(());
+        }
+        // File systems over a network may tell a length late.
+        self.file.sync_data()?;
+        is_other()
+            .map_or(Ok(()), |found_bytes| Err(io::Error::other(OtherLength { found_bytes, written_bytes })))
+    }
+
     /// Cuts it to so many bytes, if it has more.
     pub(super) fn cut(&self, bytes: u64) -> io::Result<()> {
         if self.file.metadata()?.len() > bytes { self.file.set_len(bytes) } else { Ok(()) }
@@ -387,6 +404,21 @@ impl Opened {
     /// Handle that it is written by.
     pub(super) fn file(&self) -> &File {
         &self.file
+    }
+}
+
+/// Length of a file that another process has cut or written while it was recorded into.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+#[error("it has {found_bytes} bytes where {written_bytes} were written")]
+pub struct OtherLength {
+    found_bytes: u64,
+    written_bytes: u64,
+}
+
+impl OtherLength {
+    /// The one that the error is about, if it is.
+    pub(crate) fn of(error: &io::Error) -> Option<Self> {
+        error.get_ref()?.downcast_ref().copied()
     }
 }
 

@@ -4,7 +4,8 @@
 //! written with the others, by the thread that can wait; into a file with earlier content, which it has until then, with
 //! the first that count, once they are sure to fit; into anything else at once.
 //! Invariants: whatever goes wrong, a file ends with a complete line: a write that failed half way (a full disk) is cut
-//! back to the last line that fits. Only lines that are in the file count.
+//! back to the last line that fits. Only lines that are in the file count. Into a file that somebody else has cut or written
+//! nothing more is written.
 
 use super::content::ContentState;
 use super::opened::Opened;
@@ -93,6 +94,7 @@ impl WholeLines {
         } else if self.file.has_content() {
             return Ok(());
         }
+        self.check_length()?;
         let mut done = 0;
         let bytes = self.buffer.as_bytes();
         let written = loop {
@@ -140,7 +142,13 @@ impl WholeLines {
         if !self.is_as_before() {
             self.start();
         }
-        self.flush()
+        self.flush()?;
+        self.check_length()
+    }
+
+    /// Finds out whether the file has what was written, and nothing else.
+    fn check_length(&self) -> io::Result<()> {
+        if self.file.has_content() { Ok(()) } else { self.file.check_length(self.written_bytes) }
     }
 
     /// Writes everything out to the disk itself.
@@ -152,7 +160,7 @@ impl WholeLines {
         match self.file.file().sync_data() {
             // A pipe or a character device has no disk to reach.
             Err(error) if error.kind() == io::ErrorKind::InvalidInput => Ok(()),
-            synced => synced,
+            synced => synced.and_then(|()| self.check_length()),
         }
     }
 
@@ -174,7 +182,7 @@ impl WholeLines {
         self.written_bytes += kept as u64;
         if kept < done {
             // If even this fails, the message still says how many lines are good.
-            let _ = self.file.file().set_len(self.written_bytes);
+            let _ = self.file.cut(self.written_bytes);
             let _ = self.file.file().seek(SeekFrom::Start(self.written_bytes));
         }
     }
@@ -182,6 +190,7 @@ impl WholeLines {
 
 #[cfg(test)]
 mod tests {
+    use super::super::opened::OtherLength;
     use super::*;
 
     #[test]
@@ -228,6 +237,26 @@ mod tests {
             assert!(!lines.is_removed());
             drop(lines);
             assert_eq!(std::fs::read_to_string(path).expect("there"), "head\none\n");
+        }
+    }
+
+    #[test]
+    fn a_file_that_somebody_else_cut_or_wrote_takes_no_more_and_is_not_called_whole() {
+        let directory = tempfile::tempdir().expect("a directory");
+        let path = directory.path().join("lines");
+        let line = |lines: &mut WholeLines, tick| lines.append(tick, |line| line.push_str("one"));
+        for content in ["", "head", "head\none\nand more"] {
+            let mut lines =
+                Opened::open(&path).and_then(|file| WholeLines::begin(file, "head")).expect("begun");
+            line(&mut lines, 3).and_then(|()| lines.flush()).expect("room");
+            std::fs::write(&path, content).expect("room");
+            let refused = line(&mut lines, 4).and_then(|()| lines.flush()).expect_err("another length");
+            let told = format!("it has {} bytes where 9 were written", content.len());
+            assert_eq!(OtherLength::of(&refused).expect("another length").to_string(), told);
+            assert!([lines.sync(), lines.keep()].iter().all(Result::is_err));
+            drop(lines);
+            assert_eq!(std::fs::read_to_string(&path).expect("there"), content);
+            std::fs::remove_file(&path).expect("our own");
         }
     }
 

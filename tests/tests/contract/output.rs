@@ -1,6 +1,7 @@
 //! What happens to a recording when its disk fails, and to a run when nobody reads what it says.
 
 use patience::prelude::*;
+use std::path::PathBuf;
 use std::process::{Command, Stdio};
 use system_tests::recording::Table;
 use system_tests::workplace::{Running, Said, Workplace};
@@ -272,6 +273,40 @@ fn a_recording_that_was_removed_meanwhile_is_not_told_as_if_it_were_there() {
         assert!(said.out.contains(&format!("recording    {name} (0 rows) NOT COMPLETE")), "{}", said.out);
     }
     assert!(said.out.contains("recording    out.jsonl (0 events)\n"), "that one is there: {}", said.out);
+}
+
+/// As `> out.csv` of a shell in the middle of the run.
+#[test]
+fn a_recording_that_was_emptied_meanwhile_is_not_filled_behind_a_hole_or_called_complete() {
+    let place = workplace();
+    let outputs = ["--record", "out.csv", "--record", "out.mcap", "--record", "whole.csv"];
+    let mut program = place.phantom3();
+    program.args(["run", "scene.toml", "--clock", "real", "--seconds", "40000"]).args(outputs);
+    let running = Running::start(program);
+    let files = ["out.csv", "out.mcap"].map(|name| place.path(name));
+    let has_rows = |file: &PathBuf| file.metadata().is_ok_and(|file| file.len() > 4096);
+    patience::until("rows in the table", || files.iter().all(has_rows));
+    for file in &files {
+        std::fs::write(file, "").expect("it is there");
+    }
+    let rows_before = place.path("whole.csv").metadata().expect("it is there").len();
+    let has_more =
+        || place.path("whole.csv").metadata().is_ok_and(|file| file.len() > 2 * rows_before + 4096);
+    patience::until("rows that follow", has_more);
+    let pid = rustix::process::Pid::from_child(&running.child);
+    rustix::process::kill_process(pid, rustix::process::Signal::TERM).expect("our own child");
+    let said = running.wait();
+    assert_eq!(said.status, Some(3), "{}", said.err);
+    for (name, file) in ["out.csv", "out.mcap"].iter().zip(&files) {
+        let told = format!(
+            "phantom3: another process cut the recording {name} during the run, or wrote to it: it has 0"
+        );
+        assert!(said.err.contains(&told), "{}", said.err);
+        assert!(said.out.contains(&format!("recording    {name} (0 rows) NOT COMPLETE")), "{}", said.out);
+        assert_eq!(file.metadata().expect("it is there").len(), 0);
+    }
+    let whole = said.out.lines().find(|line| line.contains("whole.csv")).expect("a line");
+    assert!(!whole.contains("NOT"), "{whole}");
 }
 
 #[test]
