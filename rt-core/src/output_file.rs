@@ -7,7 +7,8 @@
 
 use crate::sys::inherited;
 use nix::errno::Errno;
-use nix::fcntl::{FcntlArg, OFlag, fcntl};
+use nix::fcntl::{FallocateFlags, FcntlArg, OFlag, fallocate, fcntl};
+use nix::sys::statfs::{EXT4_SUPER_MAGIC, TMPFS_MAGIC, XFS_SUPER_MAGIC, fstatfs};
 use std::fs::{File, OpenOptions, TryLockError};
 use std::io;
 use std::os::unix::fs::{FileTypeExt, MetadataExt, OpenOptionsExt};
@@ -59,6 +60,16 @@ pub fn is_claimed(error: &io::Error) -> bool {
 /// Of a pipe or a device nothing is said.
 pub fn has_no_name(file: &File) -> bool {
     file.metadata().is_ok_and(|found| found.is_file() && found.nlink() == 0)
+}
+
+/// Room that was reserved for this file (fallocate(2)) is there, and writing over its content needs none: its file system neither
+/// copies what is written over nor promises what it does not have.
+#[must_use]
+pub fn keeps_reserved_room(file: &File) -> bool {
+    let known = [EXT4_SUPER_MAGIC, XFS_SUPER_MAGIC, TMPFS_MAGIC];
+    let is_known = fstatfs(file).is_ok_and(|found| known.contains(&found.filesystem_type()));
+    // A byte that is there: none is reserved, but it tells whether any could be.
+    is_known && fallocate(file, FallocateFlags::FALLOC_FL_KEEP_SIZE, 0, 1).is_ok()
 }
 
 /// This process began without a standard output, as `>&-` of a shell has it; all that is written there since is lost.

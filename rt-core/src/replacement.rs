@@ -4,7 +4,8 @@
 //! gone.
 //! Model: the result goes into a draft beside the place, which is renamed at the end. Where the directory takes no other
 //! file, the draft lies among the temporary files, and its content is copied over the former one at the end, once there
-//! is room for all of it. Pipes and devices are written directly, and so is a file without content whose directory takes
+//! is room for all of it. File systems that copy what is written over (btrfs) promise no room: there a copy of the former
+//! content is made first, among the temporary files, and put back if anything is refused. Pipes and devices are written directly, and so is a file without content whose directory takes
 //! no other. A link goes on leading to its file, which keeps its rights. A process that catches signals calls
 //! [`abandon_all`] before it ends.
 //! Invariant: at the place there is the former file or the whole new one, whatever ends the process, unless that is
@@ -14,7 +15,8 @@ use crate::{limits, output_file};
 use nix::errno::Errno;
 use nix::fcntl::{FallocateFlags, fallocate};
 use std::fs::{File, Metadata, OpenOptions, Permissions};
-use std::io::{self, Seek};
+use std::io::{self, Read, Seek, Write};
+use std::os::fd::AsRawFd;
 use std::os::unix::fs::{MetadataExt, OpenOptionsExt};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -172,7 +174,6 @@ impl Drop for Replacement {
 /// # Errors
 /// As [`Replacement::begin`], and whatever keeps the content from being written; what was there is as it was then.
 pub fn write(path: &Path, content: impl AsRef<[u8]>) -> io::Result<()> {
-    use std::io::Write;
     let replacement = Replacement::begin(path)?;
     if !replacement.is_drafted() && replacement.file.metadata()?.is_file() {
         replacement.file.set_len(0)?;
@@ -238,7 +239,7 @@ fn create_among_temporary_files(place: &Path, beside: &io::Error) -> io::Result<
 
 /// Puts the content of the draft, whatever lies under its name by now, in the place of the former one, once there is room
 /// for all of it.
-fn copy_over(mut former: &File, mut content: &File, draft: &Path, place: &Path) -> io::Result<()> {
+fn copy_over(former: &File, content: &File, draft: &Path, place: &Path) -> io::Result<()> {
     refuse_if_displaced(former, place)?;
     let bytes = content.metadata()?.len();
     if limits::largest_file().is_some_and(|most| bytes > most) {
@@ -250,10 +251,67 @@ fn copy_over(mut former: &File, mut content: &File, draft: &Path, place: &Path) 
     if let Err(full @ (Errno::ENOSPC | Errno::EDQUOT | Errno::EFBIG)) = reserved {
         return Err(full.into());
     }
-    former.set_len(former.metadata()?.len().min(bytes))?;
-    content.rewind()?;
-    let copied = io::copy(&mut content, &mut former).and_then(|_| refuse_if_displaced(former, place));
-    copied.map_err(|source| io::Error::other(Torn { source, draft: draft.into() }))
+    let is_needed = !output_file::keeps_reserved_room(former);
+    let spare = if is_needed { spared(former, bytes, place)? } else { None };
+    let torn = |source| io::Error::other(Torn { source, draft: draft.into() });
+    match write_over(former, content, spare.as_ref()) {
+        Ok(()) => refuse_if_displaced(former, place).map_err(torn),
+        Err(NotWritten { why, is_as_before: true }) => Err(why),
+        Err(NotWritten { why, is_as_before: false }) => Err(torn(why)),
+    }
+}
+
+/// Copy, without a name, of as much of the former content as so many bytes are written over; `None` of a file that this process
+/// may not read.
+fn spared(former: &File, bytes: u64, place: &Path) -> io::Result<Option<File>> {
+    // It was opened for writing alone.
+    let Ok(readable) = File::open(format!("/proc/self/fd/{}", former.as_raw_fd())) else { return Ok(None) };
+    let copied = create_draft(place, &std::env::temp_dir(), 0o600).and_then(|(mut spare, name)| {
+        std::fs::remove_file(name)?;
+        copy(&mut readable.take(bytes), &mut spare)?;
+        Ok(spare)
+    });
+    copied.map(Some).map_err(|error| {
+        let words = format!(
+            "a copy of what is there is kept among the temporary files until the new file is whole: {error}; set TMPDIR to a \
+             directory that has room for both"
+        );
+        io::Error::new(error.kind(), words)
+    })
+}
+
+/// Refusal of a content over a former one.
+#[derive(Debug)]
+struct NotWritten {
+    why: io::Error,
+    /// The former content is there, to the byte.
+    is_as_before: bool,
+}
+
+/// Writes the content over the former one, and gives up the rest of that; puts back what the spare has if anything is refused.
+fn write_over(mut former: &File, mut content: &File, spare: Option<&File>) -> Result<(), NotWritten> {
+    let at_all = |why| NotWritten { why, is_as_before: true };
+    content.rewind().map_err(at_all)?;
+    let length = former.metadata().map_err(at_all)?.len();
+    let written = copy(&mut content, &mut former).and_then(|bytes| former.set_len(bytes));
+    written.map_err(|why| {
+        let is_as_before = spare.is_some_and(|spare| put_back(former, spare, length).is_ok());
+        NotWritten { why, is_as_before }
+    })
+}
+
+/// Puts back what was written over, and cuts off what is behind the former length.
+fn put_back(mut former: &File, mut spare: &File, length: u64) -> io::Result<()> {
+    let reached = former.stream_position()?;
+    former.rewind()?;
+    spare.rewind()?;
+    copy(&mut spare.take(reached), &mut former)?;
+    if former.metadata()?.len() > length { former.set_len(length) } else { Ok(()) }
+}
+
+/// As [`io::copy`], which panics where copy_file_range(2) fails with EPERM in the middle of a file.
+fn copy(from: &mut dyn Read, to: &mut dyn Write) -> io::Result<u64> {
+    io::copy(from, to)
 }
 
 /// Nobody finds what is written to a file that has lost its name.
@@ -305,7 +363,6 @@ mod tests {
     use patience::prelude::*;
 
     use super::*;
-    use std::io::Write;
     use std::os::unix::fs::PermissionsExt;
 
     fn names(directory: &Path) -> Vec<String> {
@@ -397,6 +454,34 @@ mod tests {
         assert_eq!(std::fs::read(&place).expect("there"), b"another's");
         assert_eq!(std::fs::read(directory.path().join("b")).expect("there"), b"mine");
         assert_eq!(names(directory.path()), ["a", "b"]);
+    }
+
+    /// As on a full disk whose file system copies what is written over: room is promised, and then there is none.
+    #[test]
+    fn a_content_that_does_not_fit_after_all_is_taken_back_from_the_former_one() {
+        use nix::fcntl::{FcntlArg, SealFlag, fcntl};
+        use nix::sys::memfd::{MFdFlags, memfd_create};
+        let read =
+            |file: &File| std::fs::read(format!("/proc/self/fd/{}", file.as_raw_fd())).expect("memory");
+        let (longer, place) = (tempfile::tempfile().expect("room"), Path::new("place"));
+        (&longer).write_all(&vec![b'n'; 300_000]).expect("room");
+        for is_spared in [true, false] {
+            let former = File::from(memfd_create("former", MFdFlags::MFD_ALLOW_SEALING).expect("memory"));
+            (&former).write_all(&vec![b'f'; 200_000]).and_then(|()| (&former).rewind()).expect("room");
+            let spare = spared(&former, 300_000, place).expect("room").expect("it can be read");
+            fcntl(&former, FcntlArg::F_ADD_SEALS(SealFlag::F_SEAL_GROW)).expect("a seal");
+            let refused = write_over(&former, &longer, is_spared.then_some(&spare)).expect_err("no room");
+            assert_eq!(refused.is_as_before, is_spared);
+            assert_eq!(read(&former) == vec![b'f'; 200_000], is_spared);
+            assert_eq!(read(&former).len(), 200_000);
+        }
+        // A shorter one leaves nothing of it.
+        let former = tempfile::tempfile().expect("room");
+        (&former).write_all(&vec![b'f'; 400_000]).and_then(|()| (&former).rewind()).expect("room");
+        let spare = spared(&former, 300_000, place).expect("room").expect("it can be read");
+        assert_eq!(read(&spare).len(), 300_000);
+        write_over(&former, &longer, Some(&spare)).expect("room");
+        assert_eq!(read(&former), vec![b'n'; 300_000]);
     }
 
     #[test]

@@ -263,7 +263,7 @@ impl Opened {
         let replaced = self.contents_first(piece.len());
         // Else others of this process take the room that is found.
         let lock = || ALONE.lock().unwrap_or_else(PoisonError::into_inner);
-        let alone = (!self.keeps_reserved_room()).then(lock);
+        let alone = (!output_file::keeps_reserved_room(&self.file)).then(lock);
         if alone.is_some() {
             self.try_room(piece, replaced.as_deref().unwrap_or_default())?;
         }
@@ -334,16 +334,6 @@ impl Opened {
         }
         self.content.store(Content::Earlier);
         tried.map_err(NotReplaced::at_all)
-    }
-
-    /// Writing over its content needs no room, and room that was reserved is there.
-    fn keeps_reserved_room(&self) -> bool {
-        const EXT: i64 = 0xef53;
-        const XFS: i64 = 0x5846_5342;
-        const TMPFS: i64 = 0x0102_1994;
-        let kind = rustix::fs::fstatfs(&self.file).map_or(0, |found| found.f_type);
-        // A byte that is there: none is reserved, but it tells whether any could be.
-        [EXT, XFS, TMPFS].contains(&kind) && fallocate(&self.file, FallocateFlags::KEEP_SIZE, 0, 1).is_ok()
     }
 
     /// A file without a name on the same file system, in the same directory; `None` where there can be none.
