@@ -4,8 +4,8 @@
 //! gone.
 //! Model: the result goes into a draft beside the place, which is renamed at the end. Where the directory takes no other
 //! file, the draft lies among the temporary files, and its content is copied over the former one at the end, once there
-//! is room for all of it. File systems that copy what is written over (btrfs) promise no room: there a copy of the former
-//! content is made first, among the temporary files, and put back if anything is refused. Pipes and devices are written directly, and so is a file without content whose directory takes
+//! is room for all of it. File systems that copy what is written over (btrfs) promise no room: there it is tried behind the
+//! former content, and a copy of that is made first, among the temporary files, and put back if anything is refused. Pipes and devices are written directly, and so is a file without content whose directory takes
 //! no other. A link goes on leading to its file, which keeps its rights. A process that catches signals calls
 //! [`abandon_all`] before it ends.
 //! Invariant: at the place there is the former file or the whole new one, whatever ends the process, unless that is
@@ -26,6 +26,8 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 static UNFINISHED: Mutex<Vec<Unfinished>> = Mutex::new(Vec::new());
 /// A link that leads to so many others leads nowhere.
 const MOST_LINKS: u32 = 40;
+/// At least as much as what a file system takes for a byte.
+const BLOCK_BYTES: u64 = 1 << 17;
 
 struct Unfinished {
     /// `None`: it is written where it is to be.
@@ -245,20 +247,42 @@ fn copy_over(former: &File, content: &File, draft: &Path, place: &Path) -> io::R
     if limits::largest_file().is_some_and(|most| bytes > most) {
         return Err(Errno::EFBIG.into());
     }
-    let room = i64::try_from(bytes).unwrap_or(i64::MAX);
-    let reserved = fallocate(former, FallocateFlags::FALLOC_FL_KEEP_SIZE, 0, room);
-    // Other errors are those of a file system that cannot answer, and of nothing that is to be copied.
-    if let Err(full @ (Errno::ENOSPC | Errno::EDQUOT | Errno::EFBIG)) = reserved {
-        return Err(full.into());
-    }
-    let is_needed = !output_file::keeps_reserved_room(former);
-    let spare = if is_needed { spared(former, bytes, place)? } else { None };
+    let spare = if output_file::keeps_reserved_room(former) {
+        reserve(former, 0, bytes)?;
+        None
+    } else {
+        try_room(former, bytes)?;
+        spared(former, bytes, place)?
+    };
     let torn = |source| io::Error::other(Torn { source, draft: draft.into() });
     match write_over(former, content, spare.as_ref()) {
         Ok(()) => refuse_if_displaced(former, place).map_err(torn),
         Err(NotWritten { why, is_as_before: true }) => Err(why),
         Err(NotWritten { why, is_as_before: false }) => Err(torn(why)),
     }
+}
+
+/// Reserves room for so many bytes from there on.
+fn reserve(file: &File, from: u64, bytes: u64) -> io::Result<()> {
+    let [from, bytes] = [from, bytes].map(|count| i64::try_from(count).unwrap_or(i64::MAX));
+    match fallocate(file, FallocateFlags::FALLOC_FL_KEEP_SIZE, from, bytes) {
+        Err(full @ (Errno::ENOSPC | Errno::EDQUOT | Errno::EFBIG)) => Err(full.into()),
+        // Of a file system that cannot answer, and of nothing that is to be copied.
+        _ => Ok(()),
+    }
+}
+
+/// Finds out whether so many bytes can be written over the former content, and that back, where writing over takes room: there
+/// must be as much behind its end, where nobody sees it, and it is given back.
+fn try_room(former: &File, bytes: u64) -> io::Result<()> {
+    let found = former.metadata()?;
+    let tried = reserve(former, found.len(), bytes + bytes.min(found.len()) + BLOCK_BYTES);
+    let given_back = former.set_len(found.len());
+    if tried.is_err() {
+        // It has changed nothing that people see; of another user's file the time stays.
+        let _ = found.modified().and_then(|modified| former.set_modified(modified));
+    }
+    tried.and(given_back)
 }
 
 /// Copy, without a name, of as much of the former content as so many bytes are written over; `None` of a file that this process
@@ -475,6 +499,11 @@ mod tests {
             assert_eq!(read(&former) == vec![b'f'; 200_000], is_spared);
             assert_eq!(read(&former).len(), 200_000);
         }
+        // Of the room that is tried, for either content, nothing stays behind that which is there.
+        let room = || longer.metadata().expect("ours").blocks() * 512;
+        let room_before = room();
+        try_room(&longer, 300_000).expect("room");
+        assert!(read(&longer) == vec![b'n'; 300_000] && room() < room_before + 300_000);
         // A shorter one leaves nothing of it.
         let former = tempfile::tempfile().expect("room");
         (&former).write_all(&vec![b'f'; 400_000]).and_then(|()| (&former).rewind()).expect("room");
