@@ -5,9 +5,9 @@
 //! Model: the result goes into a draft beside the place, which is renamed at the end. Where the directory takes no other
 //! file, the draft lies among the temporary files, and its content is copied over the former one at the end, once there
 //! is room for all of it. File systems that copy what is written over (btrfs) promise no room: there it is tried behind the
-//! former content, and a copy of that is made first, among the temporary files, and put back if anything is refused. Pipes and devices are written directly, and so is a file without content whose directory takes
-//! no other. A link goes on leading to its file, which keeps its rights. A process that catches signals calls
-//! [`abandon_all`] before it ends.
+//! former content, and a copy of that is made first, among the temporary files, and put back if anything is refused. Pipes and
+//! devices are written directly, and so is a file without content whose directory takes no other. A link goes on leading to
+//! its file, which keeps its rights. A process that catches signals calls [`abandon_all`] before it ends.
 //! Invariant: at the place there is the former file or the whole new one, whatever ends the process, unless that is
 //! killed while it copies; of an end that nobody catches a draft is left, whose name begins with a dot and ends in `.part`.
 

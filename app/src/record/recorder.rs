@@ -6,8 +6,8 @@
 //! away: the run goes on. At the end the recorder has as long as it gets on; one that is stuck is given up. A reader of the
 //! standard output who has seen enough is no failure: the recording ends, and so may the run.
 //! Everything before the first row is written here, too, if it may have to wait for a reader.
-//! Invariants: on a clock that waits, a recording that lacks a row lacks all behind it, and says so. A thread that was left behind
-//! replaces no earlier content any more, which has been told as kept.
+//! Invariants: on a clock that waits, a recording that lacks a row lacks all behind it, and says so. A thread that was left
+//! behind replaces no earlier content any more, which has been told as kept.
 
 use super::backpressure::{Backpressure, Progress, Wait};
 use super::content::{Content, ContentState};
