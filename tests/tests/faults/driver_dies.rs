@@ -289,7 +289,9 @@ fn an_emergency_stop_switches_the_motors_off_behind_a_loop_that_hangs() {
     end_of_a_hung_loop(|stand| {
         client::emergency_stop_over_connection(&stand.socket(), "test").expect("it is told");
     });
-    end_of_a_hung_loop(|stand| stop_socket::send(&stand.socket()).expect("it is heard"));
+    end_of_a_hung_loop(|stand| {
+        stop_socket::send(&stand.socket()).expect("it is heard");
+    });
 }
 
 /// Amplifiers that let go by themselves, tell nobody and come back: what they held is not there any more.
