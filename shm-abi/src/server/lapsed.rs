@@ -101,10 +101,25 @@ mod tests {
         (0..=MOST as u32).for_each(|user| lapsed.note(rival(Some(user))));
         assert!(!lapsed.contains(Some(0)) && lapsed.contains(Some(1)) && !lapsed.contains(None));
         // A second time is no second place.
-        lapsed.note(rival(Some(1)));
+        (0..MOST).for_each(|_| lapsed.note(rival(Some(1))));
         assert!(lapsed.contains(Some(2)) && lapsed.contains(Some(1)));
         lapsed.note(rival(None));
         assert!(lapsed.contains(None));
+    }
+
+    #[test]
+    fn a_lapse_of_long_ago_counts_no_more() {
+        let at =
+            Instant::now().checked_sub(REMEMBERED + Duration::from_secs(1)).expect("it has been up for long");
+        let mut lapsed = Lapsed::default();
+        lapsed.0.extend([true, false].map(|has_lapsed| Entry {
+            user: Some(has_lapsed.into()),
+            at,
+            has_lapsed,
+        }));
+        assert!(!lapsed.contains(Some(1)));
+        lapsed.note_handed_back(rival(Some(0)));
+        assert!(!lapsed.contains(Some(0)), "the first one for long");
     }
 
     #[test]
