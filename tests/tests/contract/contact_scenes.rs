@@ -15,7 +15,8 @@ fn project(path: &str) -> String {
 fn played(scene: &str, seconds: &str) -> Table {
     let place = Workplace::new();
     let file = project(&format!("config/scenes/contacts/{scene}.toml"));
-    let said = place.run(["run", file.as_str(), "--clock", "virtual", "--seconds", seconds, "--record", "r.csv"]);
+    let said =
+        place.run(["run", file.as_str(), "--clock", "virtual", "--seconds", seconds, "--record", "r.csv"]);
     assert_eq!(said.status, Some(0), "{scene}: {}", said.err);
     Table::read(&place.path("r.csv"))
 }

@@ -237,7 +237,7 @@ fn check_says_of_thin_things_only_what_helps() {
             ),
         ),
     ] {
-        place.write("scene.toml", &scene(thing));
+        place.write("scene.toml", scene(thing));
         let said = check(&place, &["scene.toml"]);
         assert!(!said.out.contains("sinks"), "{}", said.out);
         assert_eq!(told.is_some_and(|words| said.out.contains(words)), told.is_some(), "{}", said.out);
