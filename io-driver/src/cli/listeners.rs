@@ -37,11 +37,15 @@ pub(super) struct Listeners {
 impl Listeners {
     /// Looks for them.
     pub(super) fn find() -> Self {
+        Self::find_within(PATIENCE)
+    }
+
+    fn find_within(patience: Duration) -> Self {
         let begun = Instant::now();
         let mut found = Self::default();
         let mut tables = HashMap::new();
         for pid in drivers() {
-            if begun.elapsed() > PATIENCE {
+            if begun.elapsed() > patience {
                 found.is_cut_short = true;
                 break;
             }
@@ -114,6 +118,8 @@ fn socket_of(line: &str) -> Option<(u32, &str)> {
 
 #[cfg(test)]
 mod tests {
+    use patience::prelude::*;
+
     use super::*;
 
     #[test]
@@ -129,6 +135,19 @@ mod tests {
         ] {
             assert_eq!(socket_of(other), None);
         }
+    }
+
+    /// Anybody may call a process so, and many of them.
+    #[test]
+    fn a_search_that_takes_too_long_is_cut_short_and_says_so() {
+        let directory = tempfile::tempdir().expect("a directory");
+        let program = directory.path().join("io-driver-not");
+        std::fs::copy("/bin/sleep", &program).expect("a copy");
+        let mut child = std::process::Command::new(&program).arg("60").spawn().expect("a process");
+        patience::until("its name", || drivers().any(|pid| pid == child.id()));
+        assert!(Listeners::find_within(Duration::ZERO).is_cut_short);
+        child.kill().expect("it is sent");
+        child.bounded_wait();
     }
 
     #[test]

@@ -61,6 +61,21 @@ fn what_moves_is_drawn_with_its_way_and_its_turn() {
     for word in ["ball", ">y<", "moved (mm)", "turned (deg)", "time (s)"] {
         assert!(svg.contains(word), "no {word} in {svg}");
     }
+    // All in one panel, of what is asked for.
+    for (what, quantity, other) in
+        [("moved", "moved along y (mm)", "turned"), ("turned", "turned (deg)", "moved")]
+    {
+        let said =
+            place.run(["plot", "drop.csv", "--objects", "--together", what, "--svg-only", "--out", what]);
+        assert_eq!(said.status, Some(0), "{}", said.err);
+        let svg =
+            std::fs::read_to_string(place.path(&format!("{what}.svg"))).expect("a picture").replace('\n', "");
+        assert!(
+            svg.contains(quantity) && svg.contains("ball") && !svg.contains(&format!("{other} (")),
+            "{svg}"
+        );
+    }
+    assert_eq!(place.run(["plot", "drop.csv", "--together", "moved"]).status, Some(2), "of objects only");
     recorded(&place, "rough", 0.5);
     let said = place.run(["plot", "rough.csv", "--objects"]);
     assert_eq!(said.status, Some(2));

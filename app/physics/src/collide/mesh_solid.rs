@@ -15,8 +15,7 @@
 //! Limits: six places a pair. Crossings are found of a box's edges, of the lines along which cylinders, cones and capsules
 //! touch, and of sharp edges that leave the vertices of a mesh that were chosen: of fine meshes these are short, but vertices
 //! lie as near. Rims of round forms are not cut off. A sheet has no inside: what is far behind it is taken for what has always
-//! been there, and limbs that are thin beside the way of a tick are lost now and then (of finely cut things that fell on sheets
-//! or flew about in rooms of triangles, 15 of 1800).
+//! been there, and limbs that are thin beside the way of a tick are lost now and then (`tests/all/meshes_sheets.rs` counts them).
 //! Cost: for each place two choices of vertices and at most eight queries for the nearest point for each side; and a search
 //! when the two have moved by a millimetre; bounded.
 
@@ -209,7 +208,7 @@ impl Place<'_> {
             .side(at_M, along_M, -1.0, 0.0)
             .and_then(|side| self.other.see_side(at_M, &side))
             .unwrap_or_else(|| self.other.see(at_M, &along_M, self.meeting.deep_m()));
-        self.has_come_through(seen, self.other.is_sheet(), 0.0)
+        self.unless_beyond(seen, self.other.is_sheet(), 0.0)
     }
 
     fn of_own(&self, own: &Own) -> Option<Seen> {
@@ -218,11 +217,11 @@ impl Place<'_> {
             .side(&own.at_M, along_M, 1.0, own.radius_m)
             .and_then(|side| see_side(self.mesh, &own.at_M, &side))
             .unwrap_or_else(|| see(self.mesh, &own.at_M, &along_M, self.meeting.deep_m()));
-        self.has_come_through(seen, self.mesh.sides() == Sides::Sheet, own.radius_m)
+        self.unless_beyond(seen, self.mesh.sides() == Sides::Sheet, own.radius_m)
     }
 
     /// What is deeper in a sheet than anything can have come is not in it, but beyond.
-    fn has_come_through(&self, seen: Seen, is_sheet: bool, radius_m: f64) -> Option<Seen> {
+    fn unless_beyond(&self, seen: Seen, is_sheet: bool, radius_m: f64) -> Option<Seen> {
         (!is_sheet || seen.gap_m - radius_m >= -self.meeting.deep_in_sheet_m()).then_some(seen)
     }
 
