@@ -148,7 +148,7 @@ fn a_driver_whose_sockets_file_is_gone_is_found_however_its_path_is_written() {
     for told in [PathBuf::from("link/driver.sock"), directory.join("driver.sock")] {
         let mut command = programs::io_driver();
         command.args(["run", "--quiet", "--config", "driver.toml", "--socket"]).arg(told);
-        let driver = Running::start(command.current_dir(place.path()));
+        let mut driver = Running::start(command.current_dir(place.path()));
         let socket = directory.join("driver.sock");
         patience::until("it listens", || client::observe(&socket, "test").is_ok());
         for file in [socket.clone(), stop_socket::path_beside(&socket)] {
@@ -161,6 +161,7 @@ fn a_driver_whose_sockets_file_is_gone_is_found_however_its_path_is_written() {
                 let mut asking = programs::io_driver();
                 asking.args([command, "--socket", path]).current_dir(place.path());
                 let end = Running::start(&mut asking).end();
+                driver.must_run();
                 assert_eq!(end.status, Some(3), "{path}: {end:?}");
                 assert!(end.err.contains(&words), "{path}: {end:?}");
             }
