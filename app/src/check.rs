@@ -7,6 +7,7 @@
 
 mod common_places;
 mod contacts;
+mod height_maps;
 mod measures;
 pub(crate) mod model_file;
 mod patch_file;
@@ -62,7 +63,7 @@ pub struct CheckArgs {
 impl CheckArgs {
     /// True of a model, false of a scene.
     pub(crate) fn is_model(&self) -> bool {
-        model::is_named(&self.scene)
+        model::is_model(&self.scene)
     }
 }
 
@@ -157,6 +158,7 @@ fn check(args: &CheckArgs, settings: &Settings) -> Checked {
     };
     let measures = Measures::all(&rig, step.entities());
     checked.warnings = suspicions::all(&rig, &measures);
+    checked.warnings.extend(height_maps::all(&rig, step.entities(), &measures));
     checked.warnings.extend(warnings::all(&rig, &whole, step.entities()));
     let suspected = suspicions::suspected(&rig, &measures);
     checked.summary = Some(Summary::of(&rig, &whole, step.entities(), measures, suspected));

@@ -22,7 +22,7 @@ use crate::frame::{is_finite, point_into_body, point_into_world, vector_into_bod
 use crate::friction::Friction;
 use crate::friction_cone::{ConeInput, FrictionCone};
 use crate::friction_law::{FrictionLaw, FrictionState};
-use crate::height_map::Over;
+use crate::height_map::{FeltHeight, Over};
 use crate::hip::Hip;
 use crate::mesh::{BallOnMesh, Beginning, Mesh, MeshCone};
 use crate::nurbs::NurbsCone;
@@ -106,6 +106,7 @@ pub(crate) struct Slot {
     label: u16,
     stiffness: ContactStiffness,
     following: Following,
+    height: FeltHeight,
     /// The most that dampers made of the force in the last tick (N).
     damped_n: f64,
     /// Inside, but above a dent of the entity's height map: nothing is felt, and nothing begins anew.
@@ -162,6 +163,7 @@ impl Slot {
         if !self.has_met() {
             self.let_go();
             self.following.reset();
+            self.height.reset();
         }
         self.contact.as_ref()
     }
@@ -498,12 +500,14 @@ impl Slot {
         let share =
             if entity.face_materials.is_some() { share * self.share_of_faces(&touch, input) } else { share };
         let is_plain = self.onset.came_on_n() == 0.0 && entity.is_plain(material);
-        let explained_n =
+        let mut explained_n =
             if is_plain { spring_n } else { self.explained_n(entity, material, &touch, input, spring_n) };
         // Apart, so that a touch that stays as it is stays in registers.
         if !matches!(entity.shading, Shading::None) || entity.height_map.is_some() {
-            touch =
+            let (shaded, raised_n) =
                 self.shade_and_raise(entity, touch, sweep, (input.cone.stiffness_n_per_m, input.way_m()))?;
+            touch = shaded;
+            explained_n += raised_n;
         }
         if share != 1.0 {
             touch.force_on_user_B *= share;
@@ -533,12 +537,7 @@ impl Slot {
         let damped_n = damped_n + std::mem::replace(&mut self.damped_n, damped_n);
         // The force turns with the entity.
         let turn = entity.previous_X_WB.rotation.rotation_to(&entity.X_WB.rotation).angle();
-        // A picture may be as steep as it likes.
-        let heights_n = entity.height_map.as_ref().map_or(0.0, |map| {
-            let [low_m, high_m] = map.range_m();
-            cone.stiffness_n_per_m * (high_m - low_m)
-        });
-        spring_n + damped_n + force_n * turn + self.onset.came_on_n() + heights_n
+        spring_n + damped_n + force_n * turn + self.onset.came_on_n()
     }
 
     /// Share of the spring that stiffer faces leave; notes the label for the next tick.
@@ -552,7 +551,8 @@ impl Slot {
         self.stiffness.share((god_object.point_B - input.cone.hip_B).dot(&god_object.normal_B).max(0.0))
     }
 
-    /// The touch as the entity's facets and heights have it; `None` above a dent.
+    /// The touch as the entity's facets and heights have it, and the change of the force that heights explain (N); `None` above
+    /// a dent.
     #[inline(never)]
     fn shade_and_raise(
         &mut self,
@@ -560,7 +560,8 @@ impl Slot {
         mut touch: Touch,
         sweep: &Sweep<'_>,
         (stiffness_n_per_m, way_m): (f64, f64),
-    ) -> Option<Touch> {
+    ) -> Option<(Touch, f64)> {
+        let mut raised_n = 0.0;
         if !matches!(entity.shading, Shading::None) {
             let plain_B = touch.force_on_user_B;
             match self.balls.as_ref().filter(|balls| balls.is_touching()) {
@@ -577,16 +578,18 @@ impl Slot {
                 stiffness_n_per_m,
                 finger_radius_m: sweep.finger_radius_m,
                 hip_B: point_into_body(&entity.X_WB, &sweep.hip.position_W),
+                way_m,
             };
-            self.hovers = !height_map.raise(&over, &mut touch);
+            let raised = height_map.raise(&over, &mut self.height, &mut touch);
+            self.hovers = raised.is_none();
             if self.hovers {
                 // Whoever comes down from here comes from outside.
                 self.onset.end();
                 self.following.reset();
-                return None;
             }
+            raised_n = raised?;
         }
-        Some(touch)
+        Some((touch, raised_n))
     }
 }
 

@@ -28,15 +28,19 @@
 //! picture of the face that it looks most like goes on.
 //!
 //! Frames: B. Invariants: a contact never pulls; nothing that is finite becomes infinite but by its own size, and no slope
-//! makes more of a force than its `sqrt(5)`-fold: beyond a slope of 2 (63 degrees) they are felt as that one, and a path may
-//! gain energy.
+//! makes more of a force than its `sqrt(5)`-fold: what is steeper than 2 (63 degrees) is felt as that ([`felt`]), cliffs too,
+//! and a path may gain energy there.
 //! Cost: nine texels and the chart, in contact only.
 
 mod error;
+mod felt;
 mod grid;
+mod survey;
 
 pub use error::HeightMapError;
+pub(crate) use felt::FeltHeight;
 pub use grid::{Border, HeightGrid, MAX_GRID_SIDE};
+pub use survey::HeightSurvey;
 
 use nalgebra::Vector3;
 use std::sync::Arc;
@@ -85,6 +89,8 @@ pub(crate) struct Over<'e> {
     pub(crate) stiffness_n_per_m: f64,
     pub(crate) finger_radius_m: f64,
     pub(crate) hip_B: Vector3<f64>,
+    /// Way of the finger in this tick \[m\].
+    pub(crate) way_m: f64,
 }
 
 /// Height and slope at a place of the surface.
@@ -97,6 +103,9 @@ struct Height {
 impl HeightMap {
     /// The highest and the deepest that anything may be \[m\].
     pub const LARGEST_AMPLITUDE_M: f64 = 1.0;
+    /// Slopes that are steeper are felt as this one: on a mesh whose texture coordinates shrink to a point they have no end, and
+    /// the force grows with them.
+    pub const STEEPEST: f64 = 2.0;
 
     /// A picture on a surface, black at the surface and white `amplitude_m` above it, or below if that is negative.
     ///
@@ -193,24 +202,28 @@ impl HeightMap {
         (height.h_m, height.slope_B)
     }
 
-    /// Makes of a contact's force what it is on the raised surface. `false` if the finger is above it.
+    /// Makes of a contact's force what it is on the raised surface, and tells by how much that explains a change of it (N).
+    /// `None` if the finger is above it.
     #[inline(never)]
-    pub(crate) fn raise(&self, over: &Over<'_>, touch: &mut Touch) -> bool {
+    pub(crate) fn raise(&self, over: &Over<'_>, felt: &mut FeltHeight, touch: &mut Touch) -> Option<f64> {
         let lift_m = self.lift_m(over.shape, over.finger_radius_m);
         let held = touch.god_object;
         let on_base_B = held.point_B - held.normal_B * (over.finger_radius_m + lift_m);
         let (h_m, slope_B) = self.height(over.shape, &SurfacePoint { point_B: on_base_B, ..held });
-        let slope_B = slope_B.cap_magnitude(STEEPEST);
-        match self.form {
+        let step = felt.follow(Height { h_m, slope_B }, over.way_m);
+        let Height { h_m, slope_B } = step.height;
+        let is_below = match self.form {
             HeightForm::AlongForce => lengthen(over.stiffness_n_per_m * h_m, touch),
             HeightForm::Gradient => {
                 let depth_m = held.normal_B.dot(&(held.point_B - over.hip_B));
-                let is_above = depth_m + (h_m - lift_m) < 0.0;
                 lean(over.stiffness_n_per_m * (h_m - lift_m), &slope_B, touch);
                 touch.god_object.point_B += held.normal_B * (h_m - lift_m);
-                !is_above
+                depth_m + (h_m - lift_m) >= 0.0
             }
-        }
+        };
+        let steepness = (1.0 + slope_B.norm_squared()).sqrt();
+        let moved_n = over.stiffness_n_per_m * (over.way_m + step.change_m) * steepness;
+        is_below.then_some(moved_n + step.lean * touch.normal_force_n)
     }
 
     fn height_of(&self, value: f64) -> f64 {
@@ -274,10 +287,6 @@ fn lean(by_n: f64, slope_B: &Vector3<f64>, touch: &mut Touch) {
     touch.normal_force_n = after_n;
     touch.god_object.normal_B = leaning_B;
 }
-
-/// Slopes that are steeper are felt as this one: on a mesh whose texture coordinates shrink to a point they have no end, and
-/// the force grows with them.
-const STEEPEST: f64 = 2.0;
 
 /// A load so small that it tells no direction.
 const LEAST_N: f64 = 1e-200;

@@ -105,7 +105,7 @@ pub use friction::{
 pub use friction_cone::{ConeForce, ConeInput, FrictionCone};
 pub use friction_law::{FrictionLaw, FrictionMemory, FrictionQuery, FrictionState, MEMORY_WORDS};
 pub use height_map::{
-    Border, HeightForm, HeightGrid, HeightMap, HeightMapError, MAX_GRID_SIDE, PictureScale,
+    Border, HeightForm, HeightGrid, HeightMap, HeightMapError, HeightSurvey, MAX_GRID_SIDE, PictureScale,
 };
 pub use hip::Hip;
 pub use material::Material;

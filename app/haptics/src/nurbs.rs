@@ -123,19 +123,26 @@ pub struct NurbsReport {
 impl fmt::Display for NurbsReport {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Self { patches, elements, cells, seams, creases, rims, poles, turned, .. } = self;
+        let of =
+            |count: usize, one: &str, more: &str| format!("{count} {}", if count == 1 { one } else { more });
         write!(
             f,
-            "{patches} patches of {elements} polynomials in {cells} cells, {seams} seams ({creases} of them"
+            "{} of {} in {}, {} ({creases} of them creases), {}",
+            of(*patches, "patch", "patches"),
+            of(*elements, "polynomial", "polynomials"),
+            of(*cells, "cell", "cells"),
+            of(*seams, "seam", "seams"),
+            of(*poles, "pole", "poles"),
         )?;
-        write!(f, " creases), {poles} poles")?;
         if *rims > 0 {
-            write!(f, "; it ends at {rims} edges: a sheet, felt from both sides")?;
+            write!(f, "; it ends at {}: a sheet, felt from both sides", of(*rims, "edge", "edges"))?;
         }
         if self.is_one_sided {
             write!(f, "; it has no inside: felt from both sides")?;
         }
         if *turned > 0 {
-            write!(f, "; {turned} closed parts were inside out and have been turned")?;
+            let (parts, were) = if *turned == 1 { ("part was", "has") } else { ("parts were", "have") };
+            write!(f, "; {turned} closed {parts} inside out and {were} been turned")?;
         }
         if let Some(first) = self.first_without_area {
             let patches = if self.without_area == 1 { "patch" } else { "patches" };

@@ -250,3 +250,33 @@ fn a_recording_is_never_written_over_its_picture() {
     assert_eq!(said.status, Some(2), "{}", said.err);
     assert_eq!(std::fs::read(place.path("bumps.png")).expect("the picture"), BUMPS);
 }
+
+#[test]
+fn check_tells_of_heights_that_are_not_felt_as_drawn() {
+    let place = Workplace::new();
+    place.write("bumps.png", BUMPS);
+    let board = "kind = \"box\", size_m = [0.2, 0.005, 0.2]";
+    let bumps = |rest: &str| format!("file = \"bumps.png\", size_m = [0.01, 0.01], {rest}");
+    let [steep, deep, high, step] = [
+        "rises by more than 63 degrees on",
+        "deep, and the thing 0.005 m thick",
+        "high, and the thing 0.2 m long",
+        "thing is met with a step of up to 10 N",
+    ];
+    for (shape, map, told) in [
+        (TABLE, SIZED.to_owned(), &[][..]),
+        (board, bumps("amplitude_m = 0.0005"), &[]),
+        (board, bumps("amplitude_m = 0.02"), &[steep]),
+        (board, bumps("amplitude_m = -0.003"), &[deep]),
+        (board, bumps("amplitude_m = 0.003, zero_level = 1.0"), &[deep]),
+        (board, bumps("amplitude_m = 0.5"), &[steep, high]),
+        (TABLE, bumps("amplitude_m = 0.01, form = \"along-force\""), &[steep, step]),
+    ] {
+        place.write("scene.toml", scene(shape, &map, ""));
+        let said = place.run(["check", "scene.toml"]);
+        assert_eq!(said.status, Some(0), "{}", said.out);
+        for words in [steep, deep, high, step] {
+            assert_eq!(said.out.contains(words), told.contains(&words), "{map}: {words}: {}", said.out);
+        }
+    }
+}

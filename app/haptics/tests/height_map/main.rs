@@ -8,5 +8,7 @@ mod solids;
 
 mod beside_meshes;
 mod charts;
+mod cliffs;
 mod feel;
 mod smooth;
+mod survey;
