@@ -110,7 +110,7 @@ impl Other<'_> {
         let point = self.X_MO.inverse_transform_point(&Point3::from(*point_M)).coords;
         let along = self.X_MO.inverse_transform_vector(along_M);
         let seen = match self.solid {
-            Solidity::Form(Form::Cuboid(cuboid)) => in_box(cuboid, &point, &along),
+            Solidity::Form(Form::Cuboid(cuboid)) => in_box(cuboid, &point, &along, deep_m),
             Solidity::Form(form) => at_form(*form, &point),
             Solidity::Mesh(mesh) => see(mesh, &point, &along, deep_m),
         };

@@ -13,12 +13,20 @@ pub(super) struct Seen {
     pub(super) gap_m: f64,
 }
 
-/// Of a box: inside, the way out is through the face that was come in by, unless another one is very much nearer.
-pub(super) fn in_box(cuboid: &Cuboid, point: &Vector3<f64>, along: &Vector3<f64>) -> Seen {
+/// Of a box: inside, the way out is through the face that was come in by, unless another one is very much nearer; and so it is
+/// behind a thin one, for what may have come through by going so deep (m).
+pub(super) fn in_box(cuboid: &Cuboid, point: &Vector3<f64>, along: &Vector3<f64>, deep_m: f64) -> Seen {
     let gap_m = cuboid.signed_distance(point);
     let axis = along.iamax();
-    let depth_m = 0.5 * cuboid.size_m()[axis] - point[axis] * along[axis].signum();
-    if gap_m <= 0.0 && depth_m < MUCH * -gap_m + LITTLE_M {
+    let half_m = Vector3::from(cuboid.size_m()) * 0.5;
+    let depth_m = half_m[axis] - point[axis] * along[axis].signum();
+    let is_through = if gap_m <= 0.0 {
+        depth_m < MUCH * -gap_m + LITTLE_M
+    } else {
+        let is_beside = (0..3).any(|other| other != axis && point[other].abs() > half_m[other]);
+        (0.0..=deep_m).contains(&depth_m) && !is_beside
+    };
+    if is_through {
         let mut out = Vector3::zeros();
         out[axis] = 1.0_f64.copysign(along[axis]);
         return Seen { out, gap_m: -depth_m };

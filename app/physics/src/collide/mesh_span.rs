@@ -15,7 +15,8 @@
 //! what comes in comes in at the rim of the patch, with little load, and goes when it has none. (Loads that come and go feed
 //! what rolls: a ball of a hundred thousand triangles rolled on for ever, or ever faster, with other rules tried.)
 //! While no vertex can have come down or risen by more than [`STILL`] of D's depth since they were sought, they are not
-//! sought anew: a body that rests, slides or spins on its face keeps its points for ever.
+//! sought anew: a body that rests, slides or spins on its face keeps its points for ever. Of what goes farther than
+//! [`FAST_M`] in a tick all are, since the next limb of what tumbles comes down far from those that were chosen.
 //! Error: what sticks out of the polygon by less than `BULGE` of the side that it sticks out of may be missing, so a
 //! tipping threshold is that of the convex hull of the contact patch to about a twentieth of the patch; where eight touch
 //! already while the patch grows beyond them, to half a side of their polygon.
@@ -99,7 +100,7 @@ impl Standing<'_> {
     /// Those that have a role, and as many of the last tick as there is room for.
     fn of_many(&self, kept: &Chosen, ticks: u32) -> Chosen {
         let is_low = |corner: &Corner| self.is_over(*corner) && self.height_m(*corner) <= self.reach_m;
-        let begins = !kept.iter().flatten().any(is_low);
+        let begins = self.is_fast() || !kept.iter().flatten().any(is_low);
         let searched = (!begins).then_some(1 + ticks as usize % (PATCH_POINTS - 1));
         let mut chosen = self.turn(kept, if begins { &FIRST } else { &LATER }, searched);
         // What is found at first is found from anywhere.
@@ -146,11 +147,16 @@ impl Standing<'_> {
         Linear::new(-self.height.along_B, level_m - self.height.base)
     }
 
+    /// What lies deepest may be another limb in each tick.
+    fn is_fast(&self) -> bool {
+        self.travel_m > FAST_M
+    }
+
     /// The one that lies deepest: of those of the last tick if any still counts, else of all.
     fn deepest(&self, kept: &Chosen) -> Option<Corner> {
         let counts = |corner: &Corner| self.is_over(*corner) && self.height_m(*corner) <= self.reach_m;
         let lower = |a: Corner, b: Corner| if self.height_m(b) < self.height_m(a) { b } else { a };
-        let mut kept = kept.iter().flatten().copied().filter(counts);
+        let mut kept = kept.iter().flatten().copied().filter(|corner| counts(corner) && !self.is_fast());
         let Some(first) = kept.next() else {
             let counts = [&self.below(self.reach_m), &Linear::ONE];
             return self
@@ -183,6 +189,8 @@ impl Standing<'_> {
     }
 }
 
+/// What goes farther in a tick is sought anew, and keeps nobody \[m\].
+const FAST_M: f64 = 1e-3;
 /// So many times as deep as all that were chosen must be what takes D's place.
 const DEEPER: f64 = 1.5;
 /// Turns of a first choice: what is found is found from anywhere.
