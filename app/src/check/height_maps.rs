@@ -23,12 +23,12 @@ fn steep(entity: &Entity, map: &HeightMap, it: &Measures) -> Option<String> {
     let degrees = |slope: f64| slope.atan().to_degrees();
     (too_steep > RIMS).then(|| {
         format!(
-            "the height map of {} rises by more than {:.0} degrees on {:.0} % of it, by {:.1} at most, and is felt as {0:.0} there, \
-             where strokes may gain energy; with a smaller `amplitude_m` or a larger picture it is felt as it is drawn",
+            "the height map of {} rises by more than {felt:.0} degrees on {:.0} % of it, by {:.0} at most, and is felt as {felt:.0} \
+             there, where strokes may gain energy; with a smaller `amplitude_m` or a larger picture it is felt as it is drawn",
             it.name,
-            degrees(HeightMap::STEEPEST),
             100.0 * too_steep,
             degrees(steepest),
+            felt = degrees(HeightMap::STEEPEST),
         )
     })
 }

@@ -261,7 +261,7 @@ fn check_tells_of_heights_that_are_not_felt_as_drawn() {
         "rises by more than 63 degrees on",
         "deep, and the thing 0.005 m thick",
         "high, and the thing 0.2 m long",
-        "thing is met with a step of up to 10 N",
+        "thing is met with a step of up to 9.988 N",
     ];
     for (shape, map, told) in [
         (TABLE, SIZED.to_owned(), &[][..]),
