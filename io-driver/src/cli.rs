@@ -65,7 +65,8 @@ pub enum DriverCommand {
     ClearFault(SocketArgs),
     /// Switch all motors off at once and keep them off until `clear-fault`
     EmergencyStop(SocketArgs),
-    /// End the lease of whoever commands: its force ramps out, and somebody else may command
+    /// End the lease of whoever commands: its force ramps out, and somebody else may command. That of another user, ended by
+    /// an administrator, is not his again for ten seconds
     EndLease(SocketArgs),
     /// Tell devices that they are in their zeroing pose
     Zero(ZeroArgs),

@@ -289,6 +289,10 @@ static inline int phantom_is_granted(const PhantomRequest *request, const Phanto
         snprintf(error, PHANTOM_ERROR_BYTES,
                  "the driver heard this too late: an emergency stop came after it was asked, or more than a second "
                  "went by; look how things stand, then ask again");
+    } else if (answer->verdict == PHANTOM_VERDICT_LEASE_ENDED) {
+        snprintf(error, PHANTOM_ERROR_BYTES,
+                 "an administrator of the driver has ended the lease of user %u; others come first for ten seconds",
+                 (unsigned)geteuid());
     } else if (answer->verdict == PHANTOM_VERDICT_UNKNOWN_KIND) {
         snprintf(error, PHANTOM_ERROR_BYTES,
                  "the driver speaks version %u.%u and does not know requests of kind %llu, this program speaks %u.%u; "

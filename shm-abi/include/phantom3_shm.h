@@ -255,6 +255,8 @@ enum PhantomVerdict
   PHANTOM_VERDICT_BUSY = 10,
   // Since 1.3. It was asked before what it would undo, or too long ago.
   PHANTOM_VERDICT_OUTDATED = 11,
+  // Since 1.3. An administrator has ended this user's lease, and others come first for some seconds.
+  PHANTOM_VERDICT_LEASE_ENDED = 12,
 };
 #ifndef __cplusplus
 #if __STDC_VERSION__ >= 202311L

@@ -366,6 +366,9 @@ fn judge(socket: &Path, request: &Request, answer: &Answer) -> Result<(), Attach
              how things stand, then ask again"
                 .into(),
         )),
+        Some(Verdict::LeaseEnded) => Err(AttachError::Refused(
+            "an administrator has ended your lease, and others come first for ten seconds; then ask again".into(),
+        )),
         Some(Verdict::NotAllowed) => Err(not_allowed(socket, request, answer)),
         Some(Verdict::UnknownKind) => {
             Err(AttachError::UnknownRequest { found, kind: request.kind, expected })

@@ -166,6 +166,8 @@ pub enum Verdict {
     Busy = 10,
     /// Since 1.3. It was asked before what it would undo, or too long ago.
     Outdated = 11,
+    /// Since 1.3. An administrator has ended this user's lease, and others come first for some seconds.
+    LeaseEnded = 12,
 }
 
 from_word!(Verdict {
@@ -180,6 +182,7 @@ from_word!(Verdict {
     NotAllowed,
     Busy,
     Outdated,
+    LeaseEnded,
 });
 
 impl Request {

@@ -448,6 +448,9 @@ impl Server {
         if matches!(process, Process::Ended) {
             return Stage::Gone;
         }
+        if self.lapsed.must_wait(self.rival(index)) {
+            return self.refuse(index, Verdict::LeaseEnded);
+        }
         // Whoever gets nothing himself takes nothing away.
         let has_place = self.has_place(index, Purpose::Command);
         if has_place {
@@ -501,21 +504,28 @@ impl Server {
     /// Puts this lease into force, if it is still wanted.
     fn grant(&mut self, lease: u64, sealed: Result<CommanderView, SegmentError>, to: &mut impl Recipient) {
         let is_it = |stage: &Stage| matches!(stage, Stage::Commanding { lease: held, .. } if *held == lease);
-        let Some(connection) = self.connections.iter_mut().find(|c| is_it(&c.stage)) else { return };
+        let Some(index) = self.connections.iter().position(|c| is_it(&c.stage)) else { return };
+        let connection = &mut self.connections[index];
         let pid = u64::from(connection.peer.pid);
         let Stage::Commanding { name, offer, .. } = &mut connection.stage else { return };
         *offer = None;
         let name = name.clone();
-        let is_granted = match sealed {
-            Ok(view) => to.take(ServerEvent::LeaseGranted { view, pid, name }).is_ok(),
-            Err(error) => {
-                let message = format!("{} ({name}) gets no lease: {error}", ProcessWords(pid));
-                let _ = to.take(ServerEvent::Trouble { message });
-                false
+        match sealed {
+            Ok(view) => {
+                if to.take(ServerEvent::LeaseGranted { view, pid, name }).is_err() {
+                    connection.stage = Stage::Gone;
+                }
             }
-        };
-        if !is_granted {
-            connection.stage = Stage::Gone;
+            // He kept his memory from being sealed, perhaps to keep others from commanding meanwhile.
+            Err(error) => {
+                connection.stage = Stage::Gone;
+                let rival = self.rival(index);
+                if !self.lapsed.contains(rival.user) {
+                    let message = format!("{} ({name}) gets no lease: {error}", ProcessWords(pid));
+                    let _ = to.take(ServerEvent::Trouble { message });
+                }
+                self.lapsed.note(rival);
+            }
         }
     }
 
@@ -527,7 +537,13 @@ impl Server {
                 self.rights.check_end_of_lease(connection.peer.user(), asker.peer.user(), || asker.groups());
             match may {
                 Err(group) => return self.deny(index, group),
-                Ok(()) => self.hang_up(holder, to),
+                Ok(()) => {
+                    let [holds, asks] = [holder, index].map(|index| self.rival(index));
+                    if asks.is_administrator && !holds.is_administrator {
+                        self.lapsed.note_ended(holds);
+                    }
+                    self.hang_up(holder, to);
+                }
             }
         }
         self.part(index, &Answer::new(Verdict::Granted))
@@ -700,6 +716,51 @@ mod tests {
         assert_eq!(granted, Verdict::Granted, "time enough");
         // Who lets one lapse gets none from others until they had time enough.
         assert_eq!(command(one).1, Verdict::LeaseHeld);
+    }
+
+    #[test]
+    #[cfg_attr(miri, ignore = "sockets are the system's")]
+    fn whose_lease_an_administrator_ends_does_not_have_it_again_at_once() {
+        let directory = tempfile::tempdir().unwrap();
+        let mut server = Server::bind(&directory.path().join("driver.sock")).unwrap();
+        let memory = DriverMemory::create(&driver_info()).unwrap();
+        let owner = server.rights.owner;
+        let [one, other] = [1, 2].map(|more| owner + more);
+        let mut asks = |uid, kind| ask(&mut server, &memory, uid, kind);
+        let (command, end) = (RequestKind::Command, RequestKind::EndLease);
+        let (_holds, granted) = asks(one, command);
+        // One who ends his own may begin again.
+        assert_eq!([granted, asks(one, end).1], [Verdict::Granted; 2]);
+        let (_holds, granted) = asks(one, command);
+        assert_eq!([granted, asks(owner, end).1], [Verdict::Granted; 2]);
+        assert_eq!(asks(one, command).1, Verdict::LeaseEnded);
+        assert_eq!(asks(other, command).1, Verdict::Granted);
+        assert_eq!(asks(owner, command).1, Verdict::Granted, "takes the other's offer");
+    }
+
+    /// His memory is sealed against sealing.
+    #[test]
+    #[cfg_attr(miri, ignore = "sockets are the system's")]
+    fn who_keeps_his_memory_from_being_sealed_has_lapsed_and_is_told_once() {
+        let directory = tempfile::tempdir().unwrap();
+        let mut server = Server::bind(&directory.path().join("driver.sock")).unwrap();
+        let memory = DriverMemory::create(&driver_info()).unwrap();
+        let owner = server.rights.owner;
+        let [one, other] = [1, 2].map(|more| owner + more);
+        let mut events = Vec::new();
+        for _ in 0..2 {
+            let (_holds, granted) =
+                ask_and_hear(&mut server, &memory, one, RequestKind::Command, &mut events);
+            assert_eq!(granted, Verdict::Granted);
+            let lease = server.next_lease - 1;
+            server.grant(lease, Err(SegmentError::NotSealed { found: 0, expected: 1 }), &mut events);
+            server.forget_the_gone();
+        }
+        let troubles = events.iter().filter(|event| matches!(event, ServerEvent::Trouble { .. })).count();
+        assert_eq!(troubles, 1, "{events:?}");
+        let (_holds, granted) = ask(&mut server, &memory, one, RequestKind::Command);
+        assert_eq!(granted, Verdict::Granted);
+        assert_eq!(ask(&mut server, &memory, other, RequestKind::Command).1, Verdict::Granted, "at once");
     }
 
     #[test]

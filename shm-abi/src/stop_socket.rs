@@ -37,7 +37,7 @@ pub enum Sent {
     QueueFull,
 }
 
-/// Asks the driver at `socket` for an emergency stop; never waits. Where nothing lies beside that name and it is a symbolic
+/// Asks the driver at `socket` for an emergency stop; never waits. Where nobody listens beside that name and it is a symbolic
 /// link, the driver is asked at what that leads to.
 ///
 /// # Errors
@@ -45,13 +45,12 @@ pub enum Sent {
 /// tells.
 pub fn send(socket: &Path) -> io::Result<Sent> {
     let sent = send_beside(socket);
-    let Err(error) = &sent else { return sent };
-    if !matches!(error.kind(), io::ErrorKind::NotFound | io::ErrorKind::NotADirectory) {
+    if sent.is_ok() {
         return sent;
     }
     match std::fs::canonicalize(socket) {
-        Ok(target) => send_beside(&target).or(sent),
-        Err(_) => sent,
+        Ok(target) if target != socket => send_beside(&target).or(sent),
+        _ => sent,
     }
 }
 

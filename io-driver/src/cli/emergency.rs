@@ -12,7 +12,7 @@
 
 use super::EXIT_FAULT;
 use super::listeners::Listeners;
-use super::places::{NotAsked, Places, nobody_asked, tell_of_unheard};
+use super::places::{NotAsked, Places, is_silent, nobody_asked, tell_of_unheard};
 use super::prompt::{PROMPT, PromptWords};
 use crate::print::print_outcome;
 use crate::say::say;
@@ -184,7 +184,12 @@ fn judge(places: &Places, told: Told) -> ExitCode {
         return nobody_asked(places, &not_asked);
     }
     let is_one_unheard = !not_asked.is_empty() && tell_of_unheard(&not_asked, &Listeners::find());
-    if is_one_unheard || !unseen.is_empty() {
+    let silent: Vec<_> = not_asked.iter().filter(|(_, error)| is_silent(error)).collect();
+    for (socket, error) in &silent {
+        let place = places.told(socket);
+        say(format_args!("io-driver: {error}; the motors may still be on; cut their power{place}"));
+    }
+    if is_one_unheard || !unseen.is_empty() || !silent.is_empty() {
         return ExitCode::from(EXIT_FAULT);
     }
     ExitCode::SUCCESS

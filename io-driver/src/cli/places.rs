@@ -1,11 +1,12 @@
 //! Places of drivers: the socket that somebody named, or the usual ones.
 
-use super::listeners::Listeners;
+use super::listeners::{Listener, Listeners};
 use super::{EXIT_FAULT, EXIT_USAGE};
 use crate::say::say;
 use clap::Args;
 use shm_abi::client::AttachError;
 use shm_abi::endpoint;
+use std::fmt;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
@@ -62,12 +63,6 @@ pub(super) type NotAsked = (PathBuf, AttachError);
 /// Tells of the drivers that listen at places where they cannot be asked, a socket's file having been moved, deleted or
 /// closed to us; whether there is one. They push on.
 pub(super) fn tell_of_unheard(not_asked: &[NotAsked], listeners: &Listeners) -> bool {
-    if listeners.is_cut_short {
-        say(format_args!(
-            "io-driver: there was no time to look at all processes that are called like a driver: others may go on that \
-             were not asked"
-        ));
-    }
     let mut is_one_there = false;
     for (socket, error) in not_asked {
         let Some(pid) = listeners.at(socket) else { continue };
@@ -87,6 +82,12 @@ pub(super) fn tell_of_unheard(not_asked: &[NotAsked], listeners: &Listeners) -> 
             "io-driver: but process {pid} listens there{why}: the motors may still be on; cut their power, or {or}"
         ));
     }
+    if listeners.is_cut_short() {
+        say(format_args!(
+            "io-driver: there was no time to look at all processes that are called like a driver: others may go on that \
+             were not asked"
+        ));
+    }
     is_one_there
 }
 
@@ -101,26 +102,57 @@ pub(super) fn nobody_asked(places: &Places, not_asked: &[NotAsked]) -> ExitCode 
     if let Some((_, error)) = first {
         say(format_args!("io-driver: {error}"));
     }
-    // Somebody listens and says nothing: nobody knows what became of the motors.
-    let is_silent = not_asked
-        .iter()
-        .any(|(_, error)| !is_elsewhere(error) || matches!(error, AttachError::HungUp { .. }));
-    let mut code = if is_silent || listeners.is_cut_short { EXIT_FAULT } else { EXIT_USAGE };
-    for other in listeners.all {
-        let (pid, socket) = (other.pid, other.socket.display());
+    let is_one_silent = not_asked.iter().any(|(_, error)| is_silent(error));
+    let mut code = if is_one_silent || listeners.is_cut_short() { EXIT_FAULT } else { EXIT_USAGE };
+    for other in listeners.all.iter().take(MOST_TOLD) {
+        let who = OtherWords(other);
         // Whoever names a driver that is not there has at least heard of those that are.
         if places.is_named {
-            say(format_args!("io-driver: process {pid} is a driver at {socket}, and was not asked"));
+            say(format_args!("io-driver: {who}, and was not asked"));
             continue;
         }
         code = EXIT_FAULT;
+        // Whatever a stranger's process says of itself is not to be asked instead.
+        let socket = if other.is_ours() && other.is_certain {
+            format!("use --socket {}, ", other.socket.display())
+        } else {
+            String::new()
+        };
         say(format_args!(
-            "io-driver: process {pid} is a driver at {socket}, and was not asked: the motors may still be on; use \
-             --socket {socket}, cut their power, or {}",
-            ending(pid)
+            "io-driver: {who}, and was not asked: the motors may still be on; {socket}cut their power, or {}",
+            ending(other.pid)
         ));
     }
+    let more = listeners.all.len().saturating_sub(MOST_TOLD);
+    if more > 0 {
+        say(format_args!("io-driver: and {more} more that are called like a driver"));
+    }
     ExitCode::from(code)
+}
+
+/// A driver at another place: what is certain of it, and what is not.
+struct OtherWords<'a>(&'a Listener);
+
+impl fmt::Display for OtherWords<'_> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Listener { pid, uid, socket, is_certain } = self.0;
+        let socket = socket.display();
+        match (self.0.is_ours(), is_certain) {
+            (true, true) => write!(f, "process {pid} is a driver at {socket}"),
+            (true, false) => {
+                write!(f, "process {pid} is called like a driver, by its socket's name at {socket}")
+            }
+            (false, _) => write!(
+                f,
+                "process {pid} of user {uid} is called like a driver, and tells of a socket {socket}"
+            ),
+        }
+    }
+}
+
+/// Somebody listens and says nothing: nobody knows what became of the motors.
+pub(super) fn is_silent(error: &AttachError) -> bool {
+    !is_elsewhere(error) || matches!(error, AttachError::HungUp { .. })
 }
 
 /// There is no driver at this place for us to ask, or none for long.
@@ -134,6 +166,9 @@ pub(super) fn is_elsewhere(error: &AttachError) -> bool {
             | AttachError::HungUp { .. }
     )
 }
+
+/// More words than these scroll away what matters.
+const MOST_TOLD: usize = 8;
 
 /// Command that ends a process which does not answer; a stopped one takes no signal but SIGKILL.
 fn ending(pid: u32) -> String {

@@ -3,9 +3,10 @@
 //! Problem: as long as an offer stands nobody else gets one; who asks, takes no lease and asks again would keep everybody from
 //! commanding. And whoever takes offers away must not keep others from it in turn.
 //! Model: an offer that nobody has mapped for [`MAPPED_WITHIN`] gives way to another user. Whoever lets that happen, keeps his
-//! memory from being sealed, or hands a second offer back within [`REMEMBERED`], has lapsed: for that time his offers give
+//! memory from being sealed, however that is done, or hands a second offer back within [`REMEMBERED`], has lapsed: for that time his offers give
 //! way at once, to whoever has not lapsed. It is his own loss: without others he commands as before. Administrators take
-//! every offer of others, give theirs to none but each other, and do not lapse. More users than [`MOST`] at once are not
+//! every offer of others, give theirs to none but each other, and do not lapse. Whoever's lease they ended waits for that
+//! time: else he who asks at once has it again before anybody else. More users than [`MOST`] at once are not
 //! remembered, the oldest first.
 //! Limit: users that cannot be told apart lapse together, and are told from each other only by time.
 
@@ -26,9 +27,12 @@ pub(super) struct Rival {
     pub(super) is_administrator: bool,
 }
 
-/// Users who let offers lapse or handed them back, the oldest first.
+/// Users who let offers lapse or handed them back, the oldest first; and the last whose lease an administrator ended.
 #[derive(Debug, Default)]
-pub(super) struct Lapsed(Vec<Entry>);
+pub(super) struct Lapsed {
+    entries: Vec<Entry>,
+    ended: Option<Entry>,
+}
 
 #[derive(Debug)]
 struct Entry {
@@ -46,13 +50,24 @@ impl Lapsed {
 
     /// This one handed an offer back before it was in force.
     pub(super) fn note_handed_back(&mut self, rival: Rival) {
-        let is_second = self.0.iter().any(|entry| entry.user == rival.user && entry.counts());
+        let is_second = self.entries.iter().any(|entry| entry.user == rival.user && entry.counts());
         self.put(rival, is_second);
+    }
+
+    /// An administrator has ended this one's lease.
+    pub(super) fn note_ended(&mut self, rival: Rival) {
+        self.ended = Some(Entry { user: rival.user, at: Instant::now(), has_lapsed: false });
+    }
+
+    /// True of one whose lease an administrator ended shortly before.
+    pub(super) fn must_wait(&self, rival: Rival) -> bool {
+        let is_it = |ended: &Entry| ended.user == rival.user && ended.counts();
+        !rival.is_administrator && self.ended.as_ref().is_some_and(is_it)
     }
 
     /// True if an offer to this user lapsed shortly before.
     pub(super) fn contains(&self, user: Option<u32>) -> bool {
-        self.0.iter().any(|entry| entry.user == user && entry.has_lapsed && entry.counts())
+        self.entries.iter().any(|entry| entry.user == user && entry.has_lapsed && entry.counts())
     }
 
     /// True if an offer that is not in force goes from its holder to a newcomer; `is_idle`: it has not been mapped in time.
@@ -70,11 +85,11 @@ impl Lapsed {
         if rival.is_administrator {
             return;
         }
-        self.0.retain(|entry| entry.user != rival.user && entry.counts());
-        if self.0.len() == MOST {
-            self.0.remove(0);
+        self.entries.retain(|entry| entry.user != rival.user && entry.counts());
+        if self.entries.len() == MOST {
+            self.entries.remove(0);
         }
-        self.0.push(Entry { user: rival.user, at: Instant::now(), has_lapsed });
+        self.entries.push(Entry { user: rival.user, at: Instant::now(), has_lapsed });
     }
 }
 
@@ -112,7 +127,7 @@ mod tests {
         let at =
             Instant::now().checked_sub(REMEMBERED + Duration::from_secs(1)).expect("it has been up for long");
         let mut lapsed = Lapsed::default();
-        lapsed.0.extend([true, false].map(|has_lapsed| Entry {
+        lapsed.entries.extend([true, false].map(|has_lapsed| Entry {
             user: Some(has_lapsed.into()),
             at,
             has_lapsed,
@@ -134,6 +149,21 @@ mod tests {
             lapsed.note_handed_back(ROOT);
         }
         assert!(!lapsed.contains(ROOT.user));
+    }
+
+    #[test]
+    fn whose_lease_an_administrator_ended_waits_for_some_seconds() {
+        let mut lapsed = Lapsed::default();
+        let [one, other] = [1, 2].map(|user| rival(Some(user)));
+        lapsed.note_ended(one);
+        assert_eq!(
+            [one, other, rival(None), ROOT].map(|rival| lapsed.must_wait(rival)),
+            [true, false, false, false]
+        );
+        let long_ago =
+            Instant::now().checked_sub(REMEMBERED + Duration::from_secs(1)).expect("it has been up for long");
+        lapsed.ended.as_mut().expect("noted").at = long_ago;
+        assert!(!lapsed.must_wait(one));
     }
 
     #[test]

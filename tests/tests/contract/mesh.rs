@@ -459,6 +459,24 @@ fn check_tells_how_a_model_is_understood_and_writes_what_needs_no_repair() {
     }
 }
 
+/// A name that says nothing is that of a model if the content is one's, else that of a scene.
+#[test]
+fn check_knows_a_model_without_an_ending_by_its_content() {
+    let place = Workplace::new();
+    for (name, format) in [("cube", Format::Obj), ("cube.bak", Format::Stl), ("cube.2", Format::StlText)] {
+        place.write(name, format.write(&cube()));
+        let said = place.run(["check", name]);
+        assert_eq!(said.status, Some(0), "{said:?}");
+        assert!(said.out.contains(&format!("{name}: can be felt")), "{}", said.out);
+    }
+    place.write("scene", "[[finger]]\n");
+    assert!(place.run(["check", "scene"]).out.contains("scene          scene\n"));
+    // What is called a scene is one, whatever is in it.
+    place.write("cube.toml", Format::Obj.write(&cube()));
+    let said = place.run(["check", "cube.toml"]);
+    assert!(said.status == Some(2) && said.out.contains("not valid TOML"), "{said:?}");
+}
+
 /// A flat bicubic patch of 0.3 m x 0.6 m.
 const PATCH: &str = "\
 v 0 0 0\nv 0.1 0 0\nv 0.2 0 0\nv 0.3 0 0\nv 0 0 0.2\nv 0.1 0 0.2\nv 0.2 0 0.2\nv 0.3 0 0.2
@@ -473,7 +491,7 @@ fn check_tells_how_patches_are_understood_and_what_a_scene_says_of_them() {
     let said = place.run(["check", "patch.obj"]);
     assert_eq!(said.status, Some(0), "{said:?}");
     for words in [
-        "1 patches of 1 polynomials",
+        "1 patch of 1 polynomial in 1 cell, 0 seams",
         "a sheet",
         "size           0.3 x 0 x 0.6\n",
         "patch.obj: can be felt\n",

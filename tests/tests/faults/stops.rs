@@ -173,6 +173,36 @@ fn a_driver_whose_sockets_file_is_gone_is_found_however_its_path_is_written() {
     }
 }
 
+/// Anybody may bind a socket that is named by a driver's number, and have it say whatever he likes.
+#[test]
+fn a_socket_that_a_stranger_names_by_a_drivers_number_is_not_told_as_its() {
+    if has_own_driver() {
+        return;
+    }
+    let places = Places::new();
+    let driver = Driver::start(&resting("real", 1));
+    let elsewhere = tempfile::tempdir().expect("a directory");
+    let decoy = elsewhere.path().join("decoy");
+    let _decoy = UnixListener::bind(decoy.with_extension(driver.child.id().to_string())).expect("a socket");
+    let end = places.ask(&["emergency-stop"]);
+    assert_eq!(end.status, Some(3), "{end:?}");
+    let words = format!("use --socket {}", driver.socket().display());
+    assert!(end.err.contains(&words) && !end.err.contains(&*decoy.to_string_lossy()), "{end:?}");
+}
+
+/// At another place somebody takes the request, and answers nothing.
+#[test]
+fn an_emergency_stop_that_one_driver_shows_and_another_does_not_answer_is_not_done() {
+    let places = Places::new();
+    let driver = driver_at(places.first());
+    std::fs::create_dir_all(places.second().parent().expect("a directory")).expect("it is made");
+    let _silent = UnixListener::bind(places.second()).expect("a socket");
+    let end = places.ask(&["emergency-stop"]);
+    assert!(is_stopped(&driver) && end.out.contains("shows the fault and no force"), "{end:?}");
+    assert_eq!(end.status, Some(3), "{end:?}");
+    assert!(end.err.contains(&format!("cut their power ({})", places.second().display())), "{end:?}");
+}
+
 /// Whoever looks out of a container sees nobody outside, and has another number there than here.
 #[test]
 fn a_driver_in_a_container_is_found_by_its_number_here_and_calls_nobody_process_0() {
