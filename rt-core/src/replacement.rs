@@ -7,13 +7,16 @@
 //! is room for all of it. File systems that copy what is written over (btrfs) promise no room: there it is tried behind the
 //! former content, and a copy of that is made first, among the temporary files, and put back if anything is refused. Pipes and
 //! devices are written directly, and so is a file without content whose directory takes no other. A link goes on leading to
-//! its file, which keeps its rights. A process that catches signals calls [`abandon_all`] before it ends.
+//! its file, which keeps its rights. What lies at the place by then and did not in the beginning is claimed before it is replaced:
+//! a run may record into it. A process that catches signals calls [`abandon_all`] before it ends.
 //! Invariant: at the place there is the former file or the whole new one, whatever ends the process, unless that is
 //! killed while it copies; of an end that nobody catches a draft is left, whose name begins with a dot and ends in `.part`.
+//! Limit: a file that others put in the place of another one between the claim and the renaming is lost. Where there is none the
+//! renaming itself refuses it, if the file system can (renameat2(2) with `RENAME_NOREPLACE`).
 
 use crate::{limits, output_file};
 use nix::errno::Errno;
-use nix::fcntl::{FallocateFlags, fallocate};
+use nix::fcntl::{AT_FDCWD, FallocateFlags, RenameFlags, fallocate, renameat2};
 use std::fs::{File, Metadata, OpenOptions, Permissions};
 use std::io::{self, Read, Seek, Write};
 use std::os::fd::AsRawFd;
@@ -26,6 +29,8 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 static UNFINISHED: Mutex<Vec<Unfinished>> = Mutex::new(Vec::new());
 /// A link that leads to so many others leads nowhere.
 const MOST_LINKS: u32 = 40;
+/// So often another file may come between a look at the place and the renaming.
+const MOST_NEWCOMERS: u32 = 100;
 /// At least as much as what a file system takes for a byte.
 const BLOCK_BYTES: u64 = 1 << 17;
 
@@ -136,7 +141,7 @@ impl Replacement {
         let mut all = unfinished();
         let moved = match &self.former {
             Some(former) if self.is_far => copy_over(former, &self.file, &draft, &self.place),
-            _ => self.claim_newcomer().and_then(|_newcomer| std::fs::rename(&draft, &self.place)),
+            _ => self.rename(&draft),
         };
         let is_of_use = moved.as_ref().is_err_and(is_torn);
         if (moved.is_err() || self.is_far) && !is_of_use {
@@ -147,14 +152,35 @@ impl Replacement {
         moved
     }
 
-    /// Claims what is there now and was not before: a run may record into it.
-    fn claim_newcomer(&self) -> io::Result<Option<File>> {
-        if self.former.is_some() {
-            return Ok(None);
+    /// Renames the draft to the place, over the former file, over another one that nobody has claimed, or where there is none.
+    fn rename(&self, draft: &Path) -> io::Result<()> {
+        for _ in 0..MOST_NEWCOMERS {
+            if self.former.as_ref().is_some_and(|former| refuse_if_displaced(former, &self.place).is_ok()) {
+                return std::fs::rename(draft, &self.place);
+            }
+            if let Some(claimed) = self.claim_newcomer()? {
+                if refuse_if_displaced(&claimed, &self.place).is_err() {
+                    continue;
+                }
+                return std::fs::rename(draft, &self.place);
+            }
+            match rename_to_nothing(draft, &self.place) {
+                Err(error) if error.kind() == io::ErrorKind::AlreadyExists => {}
+                renamed => return renamed,
+            }
         }
+        Err(io::Error::other("others put files in its place again and again"))
+    }
+
+    /// Claims what is there now and was not before: a run may record into it. `None`: nothing is there.
+    ///
+    /// # Errors
+    /// It cannot be written, or another process has claimed it.
+    fn claim_newcomer(&self) -> io::Result<Option<File>> {
         match output_file::open(&self.place, OpenOptions::new().write(true)) {
             Ok(newcomer) => output_file::claim(&newcomer).map(|()| Some(newcomer)),
-            Err(_) => Ok(None),
+            Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(None),
+            Err(error) => Err(error),
         }
     }
 }
@@ -214,6 +240,21 @@ fn target_of(path: &Path) -> io::Result<PathBuf> {
         }
     }
     Err(io::Error::other("too many links lead to one another"))
+}
+
+/// Renames the file to a name that nothing has.
+///
+/// # Errors
+/// Something has it; and the errors of rename(2).
+fn rename_to_nothing(from: &Path, to: &Path) -> io::Result<()> {
+    match renameat2(AT_FDCWD, from, AT_FDCWD, to, RenameFlags::RENAME_NOREPLACE) {
+        // Of a file system that can only replace. A link that leads to nothing is replaced, too.
+        Err(Errno::EINVAL | Errno::ENOSYS) => std::fs::rename(from, to),
+        Err(Errno::EEXIST) if to.symlink_metadata().is_ok_and(|found| found.is_symlink()) && !to.exists() => {
+            std::fs::rename(from, to)
+        }
+        renamed => Ok(renamed?),
+    }
 }
 
 /// With the rights of the file whose place it is to take.
@@ -431,6 +472,49 @@ mod tests {
         assert_eq!(std::fs::read(&place).expect("there"), b"");
         drop(other);
         write(&place, "x").expect("free again");
+    }
+
+    #[test]
+    fn a_newcomer_in_the_place_of_a_former_file_is_replaced_only_if_nobody_has_claimed_it() {
+        let directory = tempfile::tempdir().expect("a directory");
+        let place = directory.path().join("a");
+        let begin = |newcomer: &dyn Fn() -> Option<File>| {
+            std::fs::write(&place, "former").expect("room");
+            let begun = Replacement::begin(&place).expect("begun");
+            begun.file().and_then(|mut file| file.write_all(b"whole")).expect("room");
+            std::fs::remove_file(&place).expect("our own");
+            (begun, newcomer())
+        };
+        let make = || Some(output_file::create(&place).expect("room"));
+        let (begun, newcomer) =
+            begin(&|| make().inspect(|file| output_file::claim(file).expect("nobody else")));
+        assert!(output_file::is_claimed(&begun.keep().expect_err("it is written")));
+        assert_eq!(std::fs::read(&place).expect("there"), b"");
+        assert_eq!(names(directory.path()), ["a"]);
+        drop(newcomer);
+        for newcomer in [&make as &dyn Fn() -> Option<File>, &|| None] {
+            let (begun, newcomer) = begin(newcomer);
+            begun.keep().expect("nobody claims it");
+            drop(newcomer);
+            assert_eq!(std::fs::read(&place).expect("there"), b"whole");
+            assert_eq!(names(directory.path()), ["a"]);
+        }
+    }
+
+    #[test]
+    fn a_newcomer_that_cannot_be_written_stays_and_a_link_that_leads_nowhere_is_replaced() {
+        let directory = tempfile::tempdir().expect("a directory");
+        let place = directory.path().join("a");
+        let begun = Replacement::begin(&place).expect("nothing is there");
+        nix::unistd::mkfifo(&place, nix::sys::stat::Mode::S_IRWXU).expect("a pipe");
+        begun.keep().expect_err("nobody reads it");
+        assert_eq!(names(directory.path()), ["a"]);
+        rename_to_nothing(Path::new("/dev/null"), &place).expect_err("it is there");
+        std::fs::remove_file(&place).expect("our own");
+        let begun = Replacement::begin(&place).expect("nothing is there");
+        std::os::unix::fs::symlink("nowhere", &place).expect("room");
+        begun.keep().expect("nothing is lost");
+        assert!(place.symlink_metadata().expect("there").is_file());
     }
 
     /// A thread of another user, for whom the directory takes no file; root may write everywhere.

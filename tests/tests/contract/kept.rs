@@ -3,6 +3,7 @@
 use crate::abandoned::unread_pipe;
 use patience::prelude::*;
 use rustix::process::{Pid, Signal, kill_process};
+use std::io::Read;
 use std::path::Path;
 use std::process::{Command, Stdio};
 use system_tests::recording::Table;
@@ -123,6 +124,47 @@ fn an_export_that_a_signal_ends_leaves_the_earlier_tables_and_nothing_else() {
     let whole = std::fs::read(place.path("r.csv")).expect("a table");
     assert!(["out.csv", "new.csv"].iter().all(|name| std::fs::read(place.path(name)).unwrap() == whole));
     assert_eq!(hidden(&place), Vec::<String>::new());
+}
+
+/// The pipe holds the export up until a run records into a new file of the name.
+#[test]
+fn an_export_does_not_replace_what_a_run_records_into_whether_or_not_a_table_was_there_before() {
+    let place = workplace("4");
+    for (pipe, earlier) in [("p1", None), ("p2", Some("earlier"))] {
+        let out = place.path("out.csv");
+        let _ = std::fs::remove_file(&out);
+        earlier.map_or(Ok(()), |text| std::fs::write(&out, text)).expect("room");
+        let mut reader = unread_pipe(&place.path(pipe));
+        let mut program = place.phantom3();
+        program.args(["export", "r.mcap", "out.csv"]).arg(place.path(pipe));
+        let export = Running::start(program);
+        patience::until("a draft", || !hidden(&place).is_empty());
+        if earlier.is_some() {
+            std::fs::remove_file(&out).expect("it is there");
+        }
+        let mut program = place.phantom3();
+        program.args(["run", "scene.toml", "--clock", "real", "--headless", "--seconds", "40000"]);
+        program.args(["--record", "out.csv"]);
+        let run = Running::start(program);
+        patience::until("a recording", || out.metadata().is_ok_and(|file| file.len() > 9000));
+        rustix::fs::fcntl_setfl(&reader, rustix::fs::OFlags::RDWR).expect("our own pipe");
+        let read = std::thread::spawn(move || {
+            let mut bytes = vec![0; 1 << 16];
+            // It is never at its end, as this one could write to it.
+            while reader.read(&mut bytes).is_ok_and(|count| !bytes[..count].ends_with(b"the end")) {}
+        });
+        let said = export.wait();
+        std::fs::write(place.path(pipe), "the end").expect("somebody reads it");
+        read.bounded_join().expect("the reader");
+        assert_eq!(said.status, Some(3), "{earlier:?}: {}", said.err);
+        assert!(said.err.contains("cannot write out.csv: another process"), "{earlier:?}: {}", said.err);
+        signal(&run, Signal::INT);
+        let said = run.wait();
+        assert_eq!((said.status, said.err.contains("removed")), (Some(130), false), "{}", said.err);
+        let told = format!("out.csv ({} rows)", Table::read(&out).len());
+        assert!(said.out.contains(&told), "{earlier:?}: {}", said.out);
+        assert_eq!(hidden(&place), Vec::<String>::new());
+    }
 }
 
 #[test]
