@@ -72,8 +72,8 @@ impl Replacement {
     /// Begins a file that is to be here.
     ///
     /// # Errors
-    /// If it could not take its place: what is there cannot be written, another process writes it, a pipe without a reader;
-    /// or there is no place for a draft of what would cost a former content.
+    /// If it could not take its place: what is there cannot be written or its kind not be told, another process holds a lock on it,
+    /// a pipe without a reader; or there is no place for a draft of what would cost a former content.
     pub fn begin(path: &Path) -> io::Result<Self> {
         let (place, former) = match path.metadata() {
             Ok(found) if found.is_file() && !is_descriptor(path) => {
@@ -82,7 +82,9 @@ impl Replacement {
                 (path.canonicalize()?, Some((former, found.permissions())))
             }
             Err(error) if error.kind() == io::ErrorKind::NotFound => (target_of(path)?, None),
-            _ => return Self::directly(path),
+            // It may be a file with content.
+            Err(error) => return Err(error),
+            Ok(_) => return Self::directly(path),
         };
         let (former, rights) = former.unzip();
         match (create_beside(&place, rights.as_ref()), &former) {

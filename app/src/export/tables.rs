@@ -126,9 +126,10 @@ impl Table {
     ) -> Result<Self, RunFailure> {
         let refused = |error: &io::Error| not_created(out, error);
         let file = match &replacement {
-            Some(replacement) => Opened::of(replacement.file().map_err(|error| refused(&error))?, out),
-            None => Opened::open(out).map_err(|error| refused(&error))?,
+            Some(replacement) => replacement.file().and_then(|file| Opened::of(file, out)),
+            None => Opened::open(out),
         };
+        let file = file.map_err(|error| refused(&error))?;
         let (names, period_ns) = (recorded.names(), recorded.period_ns());
         let format = match format {
             TableFormat::Csv => {

@@ -94,7 +94,8 @@ impl Opened {
     /// Opens the file, or makes it; or gives the standard output another descriptor.
     ///
     /// # Errors
-    /// If the system refuses, it is a pipe that nobody reads, another process writes it, or there is no standard output.
+    /// If the system refuses or cannot tell what it is, it is a pipe that nobody reads, another process holds a lock on it, or there
+    /// is no standard output.
     pub fn open(path: &Path) -> io::Result<Self> {
         if is_standard_output(path) {
             if output_file::standard_output_was_closed() {
@@ -108,7 +109,8 @@ impl Opened {
             // Whoever claimed it first writes it: it is not removed, whoever made it.
             output_file::claim(&file)?;
             if is_at(&file, path) {
-                let before = made.map_or_else(|| Before::of(&file), Before::Absent);
+                let before =
+                    made.map_or_else(|| Before::of(file.metadata()), |made| Ok(Before::Absent(made)))?;
                 return Ok(Self::with(file, path, before));
             }
         }
@@ -116,9 +118,12 @@ impl Opened {
     }
 
     /// A file that is open already, of which people are told under this name.
-    pub fn of(file: File, path: &Path) -> Self {
-        let before = Before::of(&file);
-        Self::with(file, path, before)
+    ///
+    /// # Errors
+    /// The system cannot tell what it is.
+    pub fn of(file: File, path: &Path) -> io::Result<Self> {
+        let before = Before::of(file.metadata())?;
+        Ok(Self::with(file, path, before))
     }
 
     fn with(file: File, path: &Path, before: Before) -> Self {
@@ -444,13 +449,17 @@ fn nameless(made: Result<OwnedFd, Errno>) -> io::Result<Option<File>> {
 }
 
 impl Before {
-    /// Streams and devices have nothing to be cut off.
-    fn of(file: &File) -> Self {
-        match file.metadata() {
-            Ok(found) if found.is_file() && found.len() > 0 => Self::Content,
-            Ok(found) if found.is_file() => Self::Empty,
-            _ => Self::Stays,
-        }
+    /// By what the system tells of a file. Streams and devices have nothing to be cut off.
+    ///
+    /// # Errors
+    /// It tells nothing: there may be a content.
+    fn of(found: io::Result<Metadata>) -> io::Result<Self> {
+        let found = found?;
+        Ok(match found.len() {
+            _ if !found.is_file() => Self::Stays,
+            0 => Self::Empty,
+            _ => Self::Content,
+        })
     }
 }
 
@@ -539,7 +548,9 @@ mod tests {
             text
         };
         let file = made.try_clone().expect("a descriptor");
-        let mut lines = WholeLines::begin(Opened::of(file, Path::new("content")), "head").expect("begun");
+        let mut lines = Opened::of(file, Path::new("content"))
+            .and_then(|file| WholeLines::begin(file, "head"))
+            .expect("begun");
         lines.append(0, |line| line.push('1')).and_then(|()| lines.flush()).expect_err("no room");
         assert!(lines.has_content());
         assert_eq!(read(), "earlier rows");
@@ -641,6 +652,15 @@ mod tests {
         assert!(found().1 >= before.1);
         drop(opened);
         assert_eq!(found(), before);
+    }
+
+    #[test]
+    fn a_file_whose_kind_the_system_does_not_tell_is_refused() {
+        let refused = Before::of(Err(Errno::IO.into())).expect_err("it may have a content");
+        assert_eq!(refused.raw_os_error(), Some(Errno::IO.raw_os_error()));
+        let (_directory, path, _opened) = with_content(b"earlier rows");
+        assert_eq!(Before::of(path.metadata()).expect("there"), Before::Content);
+        assert_eq!(Before::of(Path::new("/dev/null").metadata()).expect("there"), Before::Stays);
     }
 
     #[test]

@@ -126,6 +126,36 @@ fn an_export_that_a_signal_ends_leaves_the_earlier_tables_and_nothing_else() {
     assert_eq!(hidden(&place), Vec::<String>::new());
 }
 
+/// strace makes one look of the run at its file after the other fail, as a file system over a network does.
+#[test]
+fn a_file_whose_kind_the_system_does_not_tell_keeps_its_earlier_recording() {
+    let place = workplace("0");
+    if !Command::new("strace").arg("-V").stdout(Stdio::null()).bounded_status().is_ok_and(|end| end.success())
+    {
+        eprintln!("skipped: there is no strace; a test of the module covers the same");
+        return;
+    }
+    let earlier = place.write("out.csv", "earlier");
+    let mut kept = 0;
+    for number in 1..12 {
+        std::fs::write(&earlier, "earlier").expect("room");
+        let program = place.phantom3();
+        let mut strace = place.prepare(Command::new("strace"));
+        strace.args(["-f", "-qq", "-o", "/dev/null", "-e", "trace=statx", "-e"]);
+        strace.arg(format!("inject=statx:error=EIO:when={number}")).arg("-P").arg(&earlier);
+        strace.arg(program.get_program()).args(["run", "scene.toml", "--clock", "virtual", "--headless"]);
+        strace.args(["--seconds", "0.1", "--record", "out.csv"]);
+        let said = Running::start(strace).wait();
+        if std::fs::read(&earlier).expect("there") == b"earlier" {
+            kept += 1;
+            assert_ne!(said.status, Some(0), "{number}");
+        } else {
+            assert!(!Table::read(&earlier).is_empty(), "{number}: {}", said.err);
+        }
+    }
+    assert!(kept > 0, "no look at the file was refused");
+}
+
 /// The pipe holds the export up until a run records into a new file of the name.
 #[test]
 fn an_export_does_not_replace_what_a_run_records_into_whether_or_not_a_table_was_there_before() {
