@@ -502,7 +502,7 @@ impl WholeWrites {
         match self.file.file().sync_data() {
             // A pipe or a character device has no disk to reach.
             Err(error) if error.kind() == io::ErrorKind::InvalidInput => Ok(()),
-            synced => synced.and_then(|()| self.file.check_length(self.written_bytes)),
+            synced => synced.and_then(|()| self.file.check_all(self.written_bytes)),
         }
     }
 
@@ -515,6 +515,7 @@ impl WholeWrites {
         };
         self.beginning.has_content.store(self.file.has_content(), Ordering::Relaxed);
         written?;
+        self.file.wrote(self.written_bytes, bytes);
         self.written_bytes += bytes.len() as u64;
         Ok(())
     }
@@ -553,9 +554,9 @@ impl Write for WholeWrites {
             return Err(refused);
         }
         if !self.file.has_content() {
-            let length = self.file.check_length(self.written_bytes);
-            self.has_ended |= length.is_err();
-            length?;
+            let checked = self.file.check_lately(self.written_bytes);
+            self.has_ended |= checked.is_err();
+            checked?;
         }
         let written = self.write_whole(&pending);
         if written.is_err() {
@@ -588,7 +589,8 @@ mod tests {
     fn nothing_is_written_to_a_file_that_somebody_else_cut_or_wrote() {
         let directory = tempfile::tempdir().expect("a directory");
         let path = directory.path().join("chunks");
-        for content in ["", "ch", "chunks"] {
+        // The last one is as long.
+        for content in ["", "ch", "chunks", "chun\0"] {
             let opened = Opened::open(&path).expect("a file");
             let mut whole = WholeWrites::new(opened, Arc::default());
             whole.beginning.has_rows.store(true, Ordering::Relaxed);

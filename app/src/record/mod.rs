@@ -16,6 +16,7 @@ mod event_line;
 mod events_file;
 mod files;
 mod foxglove;
+mod marks;
 mod mcap_file;
 mod opened;
 pub mod read;

@@ -11,11 +11,15 @@
 //! there can be none, in noise behind the content, which is cut off again. The rest of the content is cut off behind the piece
 //! and not before; what was written over is put back if anything is refused. Until then the first byte is [`HALF_REPLACED`], so
 //! that nobody takes what a killed process leaves for one recording. Any other file begins at once.
-//! Invariant: what was opened and not started is as it was: a file that was made here is removed again. Noise that could not be
-//! cut off is told, and cut off with this value if that is possible by then.
+//! Invariant: what was opened and not started is as it was: a file that was made here is removed again, and one that was empty
+//! is emptied, unless it has another content than was written here. Noise that could not be cut off is told, and cut off with this
+//! value if that is possible by then. A file whose kind cannot be told is refused.
+//! Limit: what others write between a look at the file and the call that undoes the start (some microseconds) is lost. A content
+//! of others is known by its length and by samples (`marks.rs`), which has limits of its own.
 
 use super::content::{Content, ContentState};
 use super::destination::{is_standard_output, shown};
+use super::marks::Marks;
 use crate::recording::RecordingError;
 use rt_core::{limits, output_file};
 use rustix::fs::{FallocateFlags, Mode, OFlags, fallocate};
@@ -42,11 +46,22 @@ pub struct Opened {
     file: File,
     path: PathBuf,
     before: Before,
-    /// Last change of the content before room was reserved behind it, if some was, and that by the reserving.
-    changed: Cell<Option<[SystemTime; 2]>>,
+    /// Room that was asked for behind the content.
+    reserved: Cell<Option<Reserved>>,
     /// Length of the content, and with noise behind it that could not be cut off.
     noisy: Cell<Option<[u64; 2]>>,
     content: Arc<ContentState>,
+    /// What was written; `None`: to a stream, or to somebody else's file.
+    marks: Option<Marks>,
+}
+
+/// Room that a file was given behind its content.
+#[derive(Debug, Clone, Copy)]
+struct Reserved {
+    /// Last change of the content before, and that by the reserving.
+    changed: [SystemTime; 2],
+    /// There was not enough already.
+    is_more: bool,
 }
 
 /// Held while the content of a file is replaced.
@@ -78,14 +93,15 @@ impl Drop for Opened {
     fn drop(&mut self) {
         // Should it be gone already, so much the better.
         let _ = match &self.before {
-            // Somebody may have put another one there.
-            Before::Absent(path) if is_itself(&self.file, path) => std::fs::remove_file(path),
-            Before::Absent(_) => Ok(()),
-            Before::Empty => self.file.set_len(0),
+            // Somebody may have put another one there, or something into it.
+            Before::Absent(path) if is_itself(&self.file, path) && self.is_as_left() => {
+                std::fs::remove_file(path)
+            }
+            Before::Empty if self.has_own() && self.is_as_left() => self.file.set_len(0),
             Before::Content => self
                 .cut_noise()
-                .and_then(|()| self.changed.take().map_or(Ok(()), |changed| self.give_room_back(changed))),
-            Before::Stays => Ok(()),
+                .and_then(|()| self.reserved.take().map_or(Ok(()), |reserved| self.give_room_back(reserved))),
+            Before::Absent(_) | Before::Empty | Before::Stays => Ok(()),
         };
     }
 }
@@ -129,8 +145,9 @@ impl Opened {
     fn with(file: File, path: &Path, before: Before) -> Self {
         let content = if before == Before::Content { Content::Earlier } else { Content::Replaced };
         let content = Arc::new(ContentState::new(content));
-        let (changed, noisy) = (Cell::default(), Cell::default());
-        Self { file, path: path.into(), before, changed, noisy, content }
+        let marks = (before != Before::Stays).then(Marks::new);
+        let (reserved, noisy) = (Cell::default(), Cell::default());
+        Self { file, path: path.into(), before, reserved, noisy, content, marks }
     }
 
     /// As [`Self::open`], for a recording.
@@ -185,10 +202,13 @@ impl Opened {
         if limits::largest_file().is_some_and(|most| bytes > most) {
             return Err(Errno::FBIG.into());
         }
-        let modified = || self.file.metadata()?.modified();
-        let before = self.changed.get().map_or_else(modified, |[before, _]| Ok(before))?;
+        let found = self.file.metadata()?;
+        let earlier = self.reserved.get();
+        let before = earlier.map_or_else(|| found.modified(), |earlier| Ok(earlier.changed[0]))?;
         let reserved = fallocate(&self.file, FallocateFlags::KEEP_SIZE, 0, bytes);
-        self.changed.set(Some([before, modified()?]));
+        let now = self.file.metadata()?;
+        let is_more = earlier.is_some_and(|earlier| earlier.is_more) || now.blocks() > found.blocks();
+        self.reserved.set(Some(Reserved { changed: [before, now.modified()?], is_more }));
         match reserved {
             Err(full @ (Errno::NOSPC | Errno::DQUOT | Errno::FBIG)) => Err(full.into()),
             // Of a file system that cannot answer.
@@ -196,12 +216,28 @@ impl Opened {
         }
     }
 
-    /// Gives the room to others again that was reserved behind the content, which was changed then. What others have changed since
-    /// stays changed; of a file of another user the time of the reserving stays.
-    fn give_room_back(&self, [before, reserved]: [SystemTime; 2]) -> io::Result<()> {
+    /// Gives the room to others again that was reserved behind the content, and the content the time of its last change; of a file
+    /// of another user the time of the reserving stays. What others have changed since is left alone.
+    fn give_room_back(&self, Reserved { changed: [before, reserved], is_more }: Reserved) -> io::Result<()> {
         let found = self.file.metadata()?;
-        self.file.set_len(found.len())?;
-        if found.modified()? == reserved { self.file.set_modified(before) } else { Ok(()) }
+        if found.modified()? != reserved {
+            return Ok(());
+        }
+        if is_more {
+            self.file.set_len(found.len())?;
+        }
+        self.file.set_modified(before)
+    }
+
+    /// Something was written to it.
+    fn has_own(&self) -> bool {
+        self.marks.as_ref().is_some_and(|marks| marks.end() > 0)
+    }
+
+    /// It has what was written to it, and nothing else.
+    fn is_as_left(&self) -> bool {
+        let Some(marks) = &self.marks else { return false };
+        self.found_of_others(marks.end(), marks, Marks::changed).is_ok_and(|found| found.is_none())
     }
 
     /// Makes ready for a first piece of so many bytes, which is to be written at once, over the content if there is some.
@@ -240,8 +276,9 @@ impl Opened {
 
     /// The last change of the content is none by others.
     fn changed_itself(&self) {
-        if let (Some([before, _]), Ok(found)) = (self.changed.get(), self.file.metadata()) {
-            self.changed.set(found.modified().ok().map(|now| [before, now]));
+        if let (Some(reserved), Ok(found)) = (self.reserved.get(), self.file.metadata()) {
+            let changed = |now| Reserved { changed: [reserved.changed[0], now], ..reserved };
+            self.reserved.set(found.modified().ok().map(changed));
         }
     }
 
@@ -363,21 +400,57 @@ impl Opened {
         Ok(first)
     }
 
-    /// Finds out whether it is as long as what was written to it, if it is a file of this process alone. A hole or the bytes of
-    /// others would be taken for a part of the recording.
+    /// Notes a piece that is in the file now, at this place.
+    pub(super) fn wrote(&mut self, at: u64, piece: &[u8]) {
+        if let Some(marks) = &mut self.marks {
+            marks.note(&self.file, at, piece);
+        }
+    }
+
+    /// Finds out whether it is as long as what was written to it and has the latest pieces, if it is a file of this process alone.
+    /// A hole or the bytes of others would be taken for a part of the recording.
     ///
     /// # Errors
-    /// [`OtherLength`], of a file that somebody else has cut or written.
-    pub(super) fn check_length(&self, written_bytes: u64) -> io::Result<()> {
-        let length = || self.file.metadata().ok().filter(Metadata::is_file).map(|found| found.len());
-        let is_other = || length().filter(|length| *length != written_bytes);
-        if is_standard_output(&self.path) || is_other().is_none() {
+    /// [`OtherLength`], of a file that somebody else has cut or written; it cannot be looked at.
+    pub(super) fn check_lately(&self, written_bytes: u64) -> io::Result<()> {
+        self.check(written_bytes, Marks::changed_lately)
+    }
+
+    /// The same with samples of all pieces.
+    ///
+    /// # Errors
+    /// As there.
+    pub(super) fn check_all(&self, written_bytes: u64) -> io::Result<()> {
+        self.check(written_bytes, Marks::changed)
+    }
+
+    fn check(
+        &self,
+        written_bytes: u64,
+        changed: impl Fn(&Marks) -> io::Result<Option<u64>>,
+    ) -> io::Result<()> {
+        let Some(marks) = &self.marks else { return Ok(()) };
+        if self.found_of_others(written_bytes, marks, &changed)?.is_none() {
             return Ok(());
         }
         // File systems over a network may tell a length late.
         self.file.sync_data()?;
-        is_other()
-            .map_or(Ok(()), |found_bytes| Err(io::Error::other(OtherLength { found_bytes, written_bytes })))
+        let found = self.found_of_others(written_bytes, marks, &changed)?;
+        found.map_or(Ok(()), |found| Err(io::Error::other(found)))
+    }
+
+    /// What others have done to it, if they have.
+    fn found_of_others(
+        &self,
+        written_bytes: u64,
+        marks: &Marks,
+        changed: impl Fn(&Marks) -> io::Result<Option<u64>>,
+    ) -> io::Result<Option<OtherLength>> {
+        let found_bytes = self.file.metadata()?.len();
+        if found_bytes != written_bytes {
+            return Ok(Some(OtherLength::Length { found_bytes, written_bytes }));
+        }
+        Ok(changed(marks)?.map(|at| OtherLength::Bytes { at }))
     }
 
     /// Cuts it to so many bytes, if it has more.
@@ -402,12 +475,23 @@ impl Opened {
     }
 }
 
-/// Length of a file that another process has cut or written while it was recorded into.
+/// What is found in a file that another process has cut or written while it was recorded into.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
-#[error("it has {found_bytes} bytes where {written_bytes} were written")]
-pub struct OtherLength {
-    found_bytes: u64,
-    written_bytes: u64,
+pub enum OtherLength {
+    /// It is longer or shorter.
+    #[error("it has {found_bytes} bytes where {written_bytes} were written")]
+    Length {
+        /// Its length.
+        found_bytes: u64,
+        /// Length that it should have.
+        written_bytes: u64,
+    },
+    /// It is as long, and has others.
+    #[error("from byte {at} on it has others than were written")]
+    Bytes {
+        /// Place of the first that was looked at and is another.
+        at: u64,
+    },
 }
 
 impl OtherLength {
@@ -661,6 +745,30 @@ mod tests {
         let (_directory, path, _opened) = with_content(b"earlier rows");
         assert_eq!(Before::of(path.metadata()).expect("there"), Before::Content);
         assert_eq!(Before::of(Path::new("/dev/null").metadata()).expect("there"), Before::Stays);
+    }
+
+    #[test]
+    fn what_others_have_written_into_a_file_that_is_not_started_stays() {
+        let directory = tempfile::tempdir().expect("a directory");
+        let path = directory.path().join("new");
+        for was_there in [false, true] {
+            for others in ["longer than the header", "", "HEAD!", "head\nand more", "head\n"] {
+                let _ = std::fs::remove_file(&path);
+                if was_there {
+                    std::fs::write(&path, "").expect("room");
+                }
+                let lines =
+                    Opened::open(&path).and_then(|file| WholeLines::begin(file, "head")).expect("begun");
+                assert_eq!(std::fs::read(&path).expect("there"), b"head\n");
+                std::fs::write(&path, others).expect("room");
+                drop(lines);
+                let left = std::fs::read_to_string(&path).ok();
+                // The same bytes are no others.
+                let as_before = was_there.then_some("");
+                let stays = if others == "head\n" { as_before } else { Some(others) };
+                assert_eq!(left.as_deref(), stays, "{was_there} {others}");
+            }
+        }
     }
 
     #[test]

@@ -94,7 +94,9 @@ impl WholeLines {
         } else if self.file.has_content() {
             return Ok(());
         }
-        self.check_length()?;
+        if !self.file.has_content() {
+            self.file.check_lately(self.written_bytes)?;
+        }
         let mut done = 0;
         let bytes = self.buffer.as_bytes();
         let written = loop {
@@ -143,12 +145,12 @@ impl WholeLines {
             self.start();
         }
         self.flush()?;
-        self.check_length()
+        self.check_all()
     }
 
     /// Finds out whether the file has what was written, and nothing else.
-    fn check_length(&self) -> io::Result<()> {
-        if self.file.has_content() { Ok(()) } else { self.file.check_length(self.written_bytes) }
+    fn check_all(&self) -> io::Result<()> {
+        if self.file.has_content() { Ok(()) } else { self.file.check_all(self.written_bytes) }
     }
 
     /// Writes everything out to the disk itself.
@@ -160,7 +162,7 @@ impl WholeLines {
         match self.file.file().sync_data() {
             // A pipe or a character device has no disk to reach.
             Err(error) if error.kind() == io::ErrorKind::InvalidInput => Ok(()),
-            synced => synced.and_then(|()| self.check_length()),
+            synced => synced.and_then(|()| self.check_all()),
         }
     }
 
@@ -179,6 +181,7 @@ impl WholeLines {
             self.last_tick = tick;
             kept = kept.max(end);
         }
+        self.file.wrote(self.written_bytes, &self.buffer.as_bytes()[..kept]);
         self.written_bytes += kept as u64;
         if kept < done {
             // If even this fails, the message still says how many lines are good.
@@ -257,6 +260,36 @@ mod tests {
             drop(lines);
             assert_eq!(std::fs::read_to_string(&path).expect("there"), content);
             std::fs::remove_file(&path).expect("our own");
+        }
+    }
+
+    #[test]
+    fn a_file_that_somebody_else_cut_and_made_as_long_again_takes_no_more_and_is_not_called_whole() {
+        let directory = tempfile::tempdir().expect("a directory");
+        let path = directory.path().join("lines");
+        let line = |lines: &mut WholeLines, tick| lines.append(tick, |line| line.push_str("one"));
+        for content in ["", "head\n"] {
+            for is_at_the_end in [true, false] {
+                let begun = Opened::open(&path).and_then(|file| WholeLines::begin(file, "head"));
+                let mut lines = begun.expect("begun");
+                line(&mut lines, 3).and_then(|()| lines.flush()).expect("room");
+                std::fs::write(&path, content).expect("room");
+                std::fs::OpenOptions::new()
+                    .write(true)
+                    .open(&path)
+                    .and_then(|file| file.set_len(9))
+                    .expect("room");
+                let refused = if is_at_the_end {
+                    lines.keep()
+                } else {
+                    line(&mut lines, 4).and_then(|()| lines.flush())
+                };
+                let found = OtherLength::of(&refused.expect_err("other bytes")).expect("others' doing");
+                assert_eq!(found, OtherLength::Bytes { at: content.len() as u64 });
+                drop(lines);
+                assert_eq!(path.metadata().expect("there").len(), 9);
+                std::fs::remove_file(&path).expect("our own");
+            }
         }
     }
 

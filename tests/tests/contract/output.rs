@@ -275,6 +275,36 @@ fn a_recording_that_was_removed_meanwhile_is_not_told_as_if_it_were_there() {
     assert!(said.out.contains("recording    out.jsonl (0 events)\n"), "that one is there: {}", said.out);
 }
 
+/// The length alone is as it was.
+#[test]
+fn a_recording_that_was_cut_and_extended_again_is_not_called_complete() {
+    let place = workplace();
+    let outputs = ["--record", "out.csv", "--record", "out.mcap", "--record", "whole.csv"];
+    let mut program = place.phantom3();
+    program.args(["run", "scene.toml", "--clock", "real", "--seconds", "40000"]).args(outputs);
+    let running = Running::start(program);
+    let files = ["out.csv", "out.mcap"].map(|name| place.path(name));
+    let has_rows = |file: &PathBuf| file.metadata().is_ok_and(|file| file.len() > 4096);
+    patience::until("rows", || files.iter().all(has_rows));
+    for file in &files {
+        let open = std::fs::OpenOptions::new().write(true).open(file).expect("it is there");
+        let length = open.metadata().expect("it is there").len();
+        open.set_len(0).and_then(|()| open.set_len(length)).expect("our own");
+    }
+    let pid = rustix::process::Pid::from_child(&running.child);
+    rustix::process::kill_process(pid, rustix::process::Signal::TERM).expect("our own child");
+    let said = running.wait();
+    assert_eq!(said.status, Some(3), "{}", said.err);
+    for name in ["out.csv", "out.mcap"] {
+        let told =
+            format!("phantom3: another process cut the recording {name} during the run, or wrote to it: ");
+        assert!(said.err.contains(&told), "{}", said.err);
+        assert!(said.out.contains(&format!("recording    {name} (0 rows) NOT COMPLETE")), "{}", said.out);
+    }
+    let whole = said.out.lines().find(|line| line.contains("whole.csv")).expect("a line");
+    assert!(!whole.contains("NOT"), "{whole}");
+}
+
 /// As `> out.csv` of a shell in the middle of the run.
 #[test]
 fn a_recording_that_was_emptied_meanwhile_is_not_filled_behind_a_hole_or_called_complete() {
