@@ -11,7 +11,7 @@ use nix::fcntl::{FallocateFlags, FcntlArg, OFlag, fallocate, fcntl};
 use nix::sys::statfs::{EXT4_SUPER_MAGIC, TMPFS_MAGIC, XFS_SUPER_MAGIC, fstatfs};
 use std::fs::{File, OpenOptions, TryLockError};
 use std::io;
-use std::os::unix::fs::{FileTypeExt, MetadataExt, OpenOptionsExt};
+use std::os::unix::fs::{FileTypeExt, OpenOptionsExt};
 use std::path::Path;
 
 /// Makes the file, or empties it.
@@ -54,12 +54,6 @@ pub fn claim(file: &File) -> io::Result<()> {
 /// The error is that of a file that another process has claimed.
 pub fn is_claimed(error: &io::Error) -> bool {
     error.kind() == io::ErrorKind::ResourceBusy && error.raw_os_error().is_none()
-}
-
-/// Nobody finds this file by a name: it was removed, or another one was put in its place, or it never had one.
-/// Of a pipe or a device nothing is said.
-pub fn has_no_name(file: &File) -> bool {
-    file.metadata().is_ok_and(|found| found.is_file() && found.nlink() == 0)
 }
 
 /// Room that was reserved for this file (fallocate(2)) is there, and writing over its content needs none: its file system neither

@@ -137,9 +137,16 @@ impl Replacement {
     /// Takes the place.
     ///
     /// # Errors
-    /// If that fails, which leaves the place as it was, but for [`is_torn`]; or another process writes there now.
+    /// If that fails, which leaves the place as it was, but for [`is_torn`]; another process holds a lock on what is there now; or
+    /// others have removed what was written, or put another file in its place.
     pub fn keep(mut self) -> io::Result<()> {
-        let Some(draft) = self.draft.take() else { return Ok(()) };
+        let Some(draft) = self.draft.take() else {
+            return if self.file.metadata()?.is_file() {
+                refuse_if_displaced(&self.file, &self.place)
+            } else {
+                Ok(())
+            };
+        };
         let mut all = unfinished();
         let moved = match &self.former {
             Some(former) if self.is_far => copy_over(former, &self.file, &draft, &self.place),
@@ -156,6 +163,8 @@ impl Replacement {
 
     /// Renames the draft to the place, over the former file, over another one that nobody has claimed, or where there is none.
     fn rename(&self, draft: &Path) -> io::Result<()> {
+        // What others have put there is not what was written.
+        refuse_if_displaced(&self.file, draft)?;
         for _ in 0..MOST_NEWCOMERS {
             if self.former.as_ref().is_some_and(|former| refuse_if_displaced(former, &self.place).is_ok()) {
                 return std::fs::rename(draft, &self.place);
@@ -517,6 +526,23 @@ mod tests {
         std::os::unix::fs::symlink("nowhere", &place).expect("room");
         begun.keep().expect("nothing is lost");
         assert!(place.symlink_metadata().expect("there").is_file());
+    }
+
+    #[test]
+    fn a_file_that_others_put_in_the_place_of_the_draft_does_not_take_the_place() {
+        let directory = tempfile::tempdir().expect("a directory");
+        let place = directory.path().join("a");
+        std::fs::write(&place, "former").expect("room");
+        for is_replaced in [true, false] {
+            let begun = Replacement::begin(&place).expect("begun");
+            let draft = begun.draft.clone().expect("a draft");
+            std::fs::remove_file(&draft).expect("our own");
+            if is_replaced {
+                std::fs::write(&draft, "another's").expect("room");
+            }
+            begun.keep().expect_err("nobody finds it");
+            assert_eq!(std::fs::read(&place).expect("there"), b"former");
+        }
     }
 
     /// A thread of another user, for whom the directory takes no file; root may write everywhere.

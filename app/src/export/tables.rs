@@ -101,8 +101,10 @@ impl Tables {
         };
         let whole: Vec<_> = open.into_iter().filter_map(finish).collect();
         let keep = |(out, replacement): (PathBuf, Option<Replacement>)| {
+            let is_drafted = replacement.as_ref().is_some_and(Replacement::is_drafted);
             let kept = replacement.map_or(Ok(()), Replacement::keep);
-            kept.map_err(|error| note(&mut failure, Some(not_kept(&out, &error)))).ok().map(|()| out)
+            let told = |error| note(&mut failure, Some(not_kept(&out, &error, is_drafted)));
+            kept.map_err(told).ok().map(|()| out)
         };
         (whole.into_iter().filter_map(keep).collect(), failure)
     }
@@ -207,7 +209,7 @@ fn not_created(out: &Path, error: &io::Error) -> RunFailure {
     wrong(&format_args!("cannot create {place}: {why}"))
 }
 
-fn not_kept(out: &Path, error: &io::Error) -> RunFailure {
-    let left = if is_torn(error) { String::new() } else { format!("; {NOTHING_LEFT}") };
+fn not_kept(out: &Path, error: &io::Error, is_drafted: bool) -> RunFailure {
+    let left = if is_torn(error) || !is_drafted { String::new() } else { format!("; {NOTHING_LEFT}") };
     RunFailure::Results(format!("cannot write {}: {error}{left}", out.display()))
 }

@@ -34,7 +34,6 @@ use io_driver::say::say;
 use mcap::records::{MessageHeader, Metadata};
 use mcap::write::NoSeek;
 use mcap::{Attachment, Compression, McapError, WriteOptions, Writer};
-use rt_core::output_file;
 use std::borrow::Cow;
 use std::collections::BTreeMap;
 use std::io::{self, Seek, SeekFrom, Write};
@@ -333,10 +332,9 @@ impl McapFile {
         let closed = self.writer.write_metadata(&end).and_then(|()| self.writer.finish().map(drop));
         closed.map_err(|error| self.failed(error))?;
         let (path, content, rows, until_s) = (self.path.clone(), self.content(), self.rows, self.until_s());
-        let whole = self.writer.into_inner().into_inner();
-        let is_removed = whole.is_removed();
+        let mut whole = self.writer.into_inner().into_inner();
         match whole.sync() {
-            Ok(()) if is_removed => Err(RecordingError::Removed { file: path, rows }),
+            Ok(()) if whole.is_removed() => Err(RecordingError::Removed { file: path, rows }),
             Ok(()) => Ok(rows),
             Err(source) => Err(RecordingError::of_write(&path, source, &content, (until_s, rows))),
         }
@@ -491,13 +489,13 @@ impl WholeWrites {
         Self { file, has_name, beginning, pending: Vec::new(), written_bytes: 0, has_ended: false }
     }
 
-    /// The name is gone that the file had in the beginning.
+    /// The name that led to the file in the beginning does so no more.
     fn is_removed(&self) -> bool {
-        self.has_name && output_file::has_no_name(self.file.file())
+        self.has_name && self.file.has_lost_name()
     }
 
     /// Writes what is left out to the disk itself.
-    fn sync(mut self) -> io::Result<()> {
+    fn sync(&mut self) -> io::Result<()> {
         self.flush()?;
         match self.file.file().sync_data() {
             // A pipe or a character device has no disk to reach.

@@ -172,9 +172,15 @@ impl Opened {
         kind.is_fifo() || kind.is_socket() || kind.is_char_device() && isatty(&self.file)
     }
 
-    /// People will look for it by its name. The standard output is somebody else's, who may keep it open.
+    /// It is a file that people find by its name: that leads to it. A pipe is at work without one, the standard output is somebody
+    /// else's, who may keep it open, and a draft has the name of another one.
     pub(super) fn has_name(&self) -> bool {
-        !is_standard_output(&self.path) && !output_file::has_no_name(&self.file)
+        self.marks.is_some() && is_at(&self.file, &self.path)
+    }
+
+    /// Nobody finds it by its name any more, which it had. A look that fails once, as over a network, is repeated.
+    pub(super) fn has_lost_name(&self) -> bool {
+        !(0..2).any(|_| self.has_name())
     }
 
     /// Loss from beginning it in vain: nothing of a stream, its place of a file that is empty, else its content.
@@ -769,6 +775,23 @@ mod tests {
                 assert_eq!(left.as_deref(), stays, "{was_there} {others}");
             }
         }
+    }
+
+    #[test]
+    fn a_name_that_leads_elsewhere_is_none_of_the_file() {
+        let directory = tempfile::tempdir().expect("a directory");
+        let [path, other, link] = ["out", "other", "link"].map(|name| directory.path().join(name));
+        let opened = Opened::open(&path).expect("opened");
+        assert!(opened.has_name());
+        std::fs::hard_link(&path, &other).and_then(|()| std::fs::remove_file(&path)).expect("room");
+        assert!(!opened.has_name(), "it has another name");
+        std::fs::write(&path, "another's").expect("room");
+        assert!(!opened.has_name(), "the name is another's");
+        std::fs::rename(&other, &path).expect("our own");
+        assert!(opened.has_name());
+        std::os::unix::fs::symlink(&path, &link).expect("room");
+        let draft = Opened::of(File::create(&other).expect("room"), &link).expect("a file");
+        assert!(!draft.has_name(), "the name is that of the file that it is to replace");
     }
 
     #[test]

@@ -9,7 +9,6 @@
 
 use super::content::ContentState;
 use super::opened::Opened;
-use rt_core::output_file;
 use std::io::{self, Seek, SeekFrom, Write};
 use std::sync::Arc;
 
@@ -166,9 +165,9 @@ impl WholeLines {
         }
     }
 
-    /// The name is gone that the file had in the beginning.
+    /// The name that led to the file in the beginning does so no more.
     pub(crate) fn is_removed(&self) -> bool {
-        self.has_name && self.is_started && output_file::has_no_name(self.file.file())
+        self.has_name && self.is_started && self.file.has_lost_name()
     }
 
     /// Counts what reached the file and cuts a line that did so only in part.

@@ -275,6 +275,38 @@ fn a_recording_that_was_removed_meanwhile_is_not_told_as_if_it_were_there() {
     assert!(said.out.contains("recording    out.jsonl (0 events)\n"), "that one is there: {}", said.out);
 }
 
+/// Renamed, replaced by another file, and removed while it has another name.
+#[test]
+fn a_recording_whose_name_leads_elsewhere_in_the_end_is_not_told_as_if_it_were_there() {
+    let place = workplace();
+    let names = ["renamed.csv", "replaced.mcap", "linked.csv", "kept.csv"];
+    let mut program = place.phantom3();
+    program.args(["run", "scene.toml", "--clock", "real", "--seconds", "40000"]);
+    program.args(names.iter().flat_map(|name| ["--record", name]));
+    let running = Running::start(program);
+    let files = names.map(|name| place.path(name));
+    let has_rows = |file: &PathBuf| file.metadata().is_ok_and(|file| file.len() > 4096);
+    patience::until("rows", || files.iter().all(has_rows));
+    for (number, file) in files[..2].iter().enumerate() {
+        std::fs::rename(file, place.path(format!("elsewhere-{number}"))).expect("it is there");
+    }
+    std::fs::write(&files[1], "another's").expect("room");
+    std::fs::hard_link(&files[2], place.path("elsewhere-2")).expect("room");
+    std::fs::remove_file(&files[2]).expect("it is there");
+    let pid = rustix::process::Pid::from_child(&running.child);
+    rustix::process::kill_process(pid, rustix::process::Signal::TERM).expect("our own child");
+    let said = running.wait();
+    assert_eq!(said.status, Some(3), "{}", said.err);
+    for name in &names[..3] {
+        let told = format!("phantom3: the recording {name} was removed ");
+        assert!(said.err.contains(&told), "{}", said.err);
+        assert!(said.out.contains(&format!("recording    {name} (0 rows) NOT COMPLETE")), "{}", said.out);
+    }
+    assert_eq!(std::fs::read(&files[1]).expect("it is there"), b"another's");
+    let kept = said.out.lines().find(|line| line.contains("kept.csv")).expect("a line");
+    assert!(!kept.contains("NOT"), "{kept}");
+}
+
 /// The length alone is as it was.
 #[test]
 fn a_recording_that_was_cut_and_extended_again_is_not_called_complete() {
