@@ -38,20 +38,20 @@ pub fn open(path: &Path, options: &OpenOptions) -> io::Result<File> {
 /// and devices are left alone, and so are files of file systems without such locks.
 ///
 /// # Errors
-/// Another process has claimed it ([`is_claimed`]).
+/// Another process holds such a lock on it, whether it writes the file or reads it ([`is_claimed`]).
 pub fn claim(file: &File) -> io::Result<()> {
     if !file.metadata()?.is_file() {
         return Ok(());
     }
     match file.try_lock() {
         Err(TryLockError::WouldBlock) => {
-            Err(io::Error::new(io::ErrorKind::ResourceBusy, "another process writes it"))
+            Err(io::Error::new(io::ErrorKind::ResourceBusy, "another process holds a lock on it"))
         }
         Ok(()) | Err(TryLockError::Error(_)) => Ok(()),
     }
 }
 
-/// The error is that of a file that another process has claimed.
+/// The error is that of a file on which another process holds a lock.
 pub fn is_claimed(error: &io::Error) -> bool {
     error.kind() == io::ErrorKind::ResourceBusy && error.raw_os_error().is_none()
 }
@@ -126,8 +126,22 @@ mod tests {
         std::fs::remove_file(&path).expect("our own");
         assert!(claimed.0.is_ok() && again.is_ok());
         let refused = claimed.1.expect_err("claimed by the first");
-        assert!(is_claimed(&refused) && refused.to_string() == "another process writes it", "{refused}");
+        assert!(is_claimed(&refused));
         let [first, second] = [(); 2].map(|()| create(Path::new("/dev/null")).expect("a device"));
         assert!(claim(&first).is_ok() && claim(&second).is_ok());
+    }
+
+    #[test]
+    fn a_file_that_a_reader_has_locked_is_not_said_to_be_written() {
+        let directory = tempfile::tempdir().expect("a directory");
+        let path = directory.path().join("read");
+        let file = create(&path).expect("room");
+        let reader = File::open(&path).expect("it is there");
+        reader.lock_shared().expect("nobody else");
+        let refused = claim(&file).expect_err("it is locked");
+        assert!(
+            is_claimed(&refused) && refused.to_string() == "another process holds a lock on it",
+            "{refused}"
+        );
     }
 }

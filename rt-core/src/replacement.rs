@@ -371,8 +371,10 @@ fn write_over(mut former: &File, mut content: &File, spare: Option<&File>) -> Re
     let length = former.metadata().map_err(at_all)?.len();
     let written = copy(&mut content, &mut former).and_then(|bytes| former.set_len(bytes));
     written.map_err(|why| {
-        let is_as_before = spare.is_some_and(|spare| put_back(former, spare, length).is_ok());
-        NotWritten { why, is_as_before }
+        let is_untouched = former.stream_position().is_ok_and(|reached| reached == 0)
+            && former.metadata().is_ok_and(|found| found.len() == length);
+        let is_put_back = || spare.is_some_and(|spare| put_back(former, spare, length).is_ok());
+        NotWritten { why, is_as_before: is_untouched || is_put_back() }
     })
 }
 
@@ -611,6 +613,12 @@ mod tests {
             assert_eq!(read(&former) == vec![b'f'; 200_000], is_spared);
             assert_eq!(read(&former).len(), 200_000);
         }
+        // Where the very first write is refused, nothing is there to be put back.
+        let former = File::from(memfd_create("former", MFdFlags::MFD_ALLOW_SEALING).expect("memory"));
+        (&former).write_all(b"former").and_then(|()| (&former).rewind()).expect("room");
+        fcntl(&former, FcntlArg::F_ADD_SEALS(SealFlag::F_SEAL_WRITE)).expect("a seal");
+        assert!(write_over(&former, &longer, None).expect_err("sealed").is_as_before);
+        assert_eq!(read(&former), b"former");
         // Of the room that is tried, for either content, nothing stays behind that which is there.
         let room = || longer.metadata().expect("ours").blocks() * 512;
         let room_before = room();
