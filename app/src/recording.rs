@@ -35,9 +35,9 @@ pub enum RecordingError {
         /// The system's error.
         source: io::Error,
     },
-    /// Somebody else records into it.
+    /// Another process holds a lock on it: it writes the file, or reads it.
     #[error(
-        "cannot create the recording {file}: another process writes it; name another file, or wait until that has ended"
+        "cannot create the recording {file}: another process holds a lock on it; name another file, or wait until that has ended"
     )]
     Claimed {
         /// The file.
@@ -46,9 +46,9 @@ pub enum RecordingError {
     /// Its name says no format.
     #[error("cannot tell the format of {0}")]
     Format(#[from] FormatError),
-    /// Nobody finds it.
+    /// Nobody finds it by its name.
     #[error(
-        "the recording {file} was removed during the run, or another file put in its place: its {rows} rows are lost"
+        "the recording {file} was removed or renamed during the run, or another file put in its place: its {rows} rows are not there"
     )]
     Removed {
         /// Its name.
@@ -63,7 +63,7 @@ pub enum RecordingError {
     OtherLength {
         /// Which.
         file: PathBuf,
-        /// Length that it has, and that it should have.
+        /// Length that it has and should have, or where its bytes are others.
         length: OtherLength,
     },
     /// Its first piece would not fit.

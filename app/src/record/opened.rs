@@ -818,7 +818,7 @@ mod tests {
         let path = directory.path().join("new");
         let first = Opened::open(&path).expect("opened");
         let refused = Opened::recording(&path).expect_err("it is being written");
-        assert!(refused.to_string().contains("another process writes it"), "{refused}");
+        assert!(refused.to_string().contains("another process holds a lock on it"), "{refused}");
         assert!(path.exists());
         drop(first);
         assert!(!path.exists(), "made for nothing");

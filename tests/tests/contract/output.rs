@@ -268,7 +268,7 @@ fn a_recording_that_was_removed_meanwhile_is_not_told_as_if_it_were_there() {
     let said = running.wait();
     assert_eq!(said.status, Some(3), "{}", said.err);
     for name in ["out.csv", "out.mcap"] {
-        let told = format!("phantom3: the recording {name} was removed during the run");
+        let told = format!("phantom3: the recording {name} was removed or renamed during the run");
         assert!(said.err.contains(&told), "{}", said.err);
         assert!(said.out.contains(&format!("recording    {name} (0 rows) NOT COMPLETE")), "{}", said.out);
     }
@@ -298,7 +298,7 @@ fn a_recording_whose_name_leads_elsewhere_in_the_end_is_not_told_as_if_it_were_t
     let said = running.wait();
     assert_eq!(said.status, Some(3), "{}", said.err);
     for name in &names[..3] {
-        let told = format!("phantom3: the recording {name} was removed ");
+        let told = format!("phantom3: the recording {name} was removed or renamed during the run");
         assert!(said.err.contains(&told), "{}", said.err);
         assert!(said.out.contains(&format!("recording    {name} (0 rows) NOT COMPLETE")), "{}", said.out);
     }
