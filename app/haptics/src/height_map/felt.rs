@@ -2,14 +2,14 @@
 //!
 //! Problem: a picture may have cliffs of centimetres from one texel to the next, and noise that no way of a hand explains.
 //! Model: what is felt follows the picture as the finger goes, by [`HeightMap::STEEPEST`] of its way at most; the slope follows by
-//! [`MOST_LEAN`] a tick. A touch begins with what the
+//! [`LEAN_PER_M`] of it. A touch begins with what the
 //! picture says; over a dent, where nothing is felt, it goes on.
 //! Invariant: a picture that is nowhere steeper, and leans over more slowly, is felt as it is, to the bit.
 
 use super::{Height, HeightMap};
 
-/// Change of the slope in a tick: over a bed of cliffs it takes four to turn over.
-const MOST_LEAN: f64 = 1.0;
+/// Change of the slope by the way \[1/m\]: waves of 1 mm that are as steep as 0.8 lean over as fast.
+const LEAN_PER_M: f64 = 5000.0;
 
 /// What was felt in the last tick of a touch.
 #[derive(Debug, Clone, Copy, Default)]
@@ -42,11 +42,12 @@ impl FeltHeight {
         let (most_m, rise_m) = (HeightMap::STEEPEST * way_m, picture.h_m - last.h_m);
         let h_m = if rise_m.abs() <= most_m { picture.h_m } else { last.h_m + most_m.copysign(rise_m) };
         let over_B = slope_B - last.slope_B;
-        let leans = over_B.norm() > MOST_LEAN;
-        let slope_B = if leans { last.slope_B + over_B.normalize() * MOST_LEAN } else { slope_B };
+        let most = LEAN_PER_M * way_m;
+        let leans = over_B.norm() > most;
+        let slope_B = if leans { last.slope_B + over_B.normalize() * most } else { slope_B };
         let height = Height { h_m, slope_B };
         self.0 = Some(height);
-        Step { height, change_m: (h_m - last.h_m).abs(), lean: over_B.norm().min(MOST_LEAN) }
+        Step { height, change_m: (h_m - last.h_m).abs(), lean: over_B.norm().min(most) }
     }
 }
 
@@ -84,11 +85,11 @@ mod tests {
     }
 
     #[test]
-    fn a_slope_turns_over_within_four_ticks() {
+    fn a_slope_turns_over_by_the_way_however_long_that_takes() {
         let mut felt = FeltHeight::default();
         felt.follow(height(0.0, -50.0), 1e-4);
-        let slopes = [(); 5].map(|()| felt.follow(height(0.0, 50.0), 1e-4));
-        assert_eq!(slopes.map(|step| step.height.slope_B.x), [-1.0, 0.0, 1.0, 2.0, 2.0]);
-        assert_eq!(slopes.map(|step| step.lean), [1.0, 1.0, 1.0, 1.0, 0.0]);
+        let slopes = [2e-4, 0.0, 2e-4, 4e-4, 1e-4].map(|way_m| felt.follow(height(0.0, 50.0), way_m));
+        assert_eq!(slopes.map(|step| step.height.slope_B.x), [-1.0, -1.0, 0.0, 2.0, 2.0]);
+        assert_eq!(slopes.map(|step| step.lean), [1.0, 0.0, 1.0, 2.0, 0.0]);
     }
 }
