@@ -85,7 +85,7 @@ impl Listeners {
             let table: &mut Table = tables.entry(network).or_default();
             let status = std::fs::read_to_string(format!("/proc/{pid}/status")).unwrap_or_default();
             let Some(uid) = user(&status) else { continue };
-            let whose = match held_sockets(pid, &is_time_left) {
+            let whose = match held_sockets(pid, is_time_left) {
                 Some(held) => Whose::Held(held),
                 None => Whose::Named(own_number(&status).unwrap_or(pid)),
             };
