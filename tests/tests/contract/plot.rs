@@ -69,7 +69,7 @@ fn what_moves_is_drawn_with_its_way_and_its_turn() {
             place.run(["plot", "drop.csv", "--objects", "--together", what, "--svg-only", "--out", what]);
         assert_eq!(said.status, Some(0), "{}", said.err);
         let svg =
-            std::fs::read_to_string(place.path(&format!("{what}.svg"))).expect("a picture").replace('\n', "");
+            std::fs::read_to_string(place.path(format!("{what}.svg"))).expect("a picture").replace('\n', "");
         assert!(
             svg.contains(quantity) && svg.contains("ball") && !svg.contains(&format!("{other} (")),
             "{svg}"
