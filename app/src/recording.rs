@@ -7,7 +7,7 @@
 pub use crate::columns::Names;
 use crate::columns::{Cell, columns, each_cell};
 use crate::record::destination::{FormatError, STANDARD_OUTPUT, shown};
-use crate::record::{Content, ContentState, Opened, OtherLength, WholeLines};
+use crate::record::{Content, ContentState, Opened, OtherContent, WholeLines};
 use crate::row::{BodyRow, Row};
 use io_driver::device::run_time_s;
 use std::fmt::Write as _;
@@ -58,13 +58,13 @@ pub enum RecordingError {
     },
     /// Somebody else cut or wrote it.
     #[error(
-        "another process cut the recording {file} during the run, or wrote to it: {length}; nothing more is written to it"
+        "another process cut the recording {file} during the run, or wrote to it: {found}; nothing more is written to it"
     )]
-    OtherLength {
+    OtherContent {
         /// Which.
         file: PathBuf,
         /// Length that it has and should have, or where its bytes are others.
-        length: OtherLength,
+        found: OtherContent,
     },
     /// Its first piece would not fit.
     #[error(
@@ -124,8 +124,8 @@ impl RecordingError {
         (until_s, rows): (f64, u64),
     ) -> Self {
         let file = file.to_owned();
-        if let Some(length) = OtherLength::of(&source) {
-            return Self::OtherLength { file, length };
+        if let Some(found) = OtherContent::of(&source) {
+            return Self::OtherContent { file, found };
         }
         match content.load() {
             Content::Earlier => Self::NotBegun { file, source },
@@ -163,7 +163,7 @@ impl RecordingError {
             | Self::NoThread { file, .. }
             | Self::Claimed { file }
             | Self::Removed { file, .. }
-            | Self::OtherLength { file, .. }
+            | Self::OtherContent { file, .. }
             | Self::NotBegun { file, .. }
             | Self::Noise { file, .. }
             | Self::Write { file, .. } => file,

@@ -10,6 +10,7 @@ mod lease_end;
 mod listeners;
 mod places;
 mod prompt;
+mod socket_table;
 mod stopping;
 #[cfg(test)]
 pub(crate) mod told;

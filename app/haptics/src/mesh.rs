@@ -71,6 +71,8 @@ pub use hole::CloseHoles;
 pub use labels::FaceData;
 pub use mesh_cone::{Beginning, MeshCone};
 pub use normals::{SHARPEST_CREASE_RAD, VertexNormals};
+pub(crate) use repair::area_vector;
+pub(crate) use report::plural;
 pub use report::{Finding, MeshReport, NarrowGaps, OpenHole, OpenHoles};
 pub(crate) use rolling::BallOnMesh;
 pub use soup::TriangleSoup;

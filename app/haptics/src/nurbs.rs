@@ -44,7 +44,7 @@ pub use patch::{MAX_DEGREE, NurbsPatch};
 pub use seams::SMOOTH_RAD;
 pub(crate) use walker::Walker;
 
-use crate::mesh::Sides;
+use crate::mesh::{Sides, plural};
 use bezier::{Control, elements_of};
 use poles::Pole;
 use seams::Edge;
@@ -123,8 +123,9 @@ pub struct NurbsReport {
 impl fmt::Display for NurbsReport {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Self { patches, elements, cells, seams, creases, rims, poles, turned, .. } = self;
-        let of =
-            |count: usize, one: &str, more: &str| format!("{count} {}", if count == 1 { one } else { more });
+        let of = |count: usize, one: &'static str, more: &'static str| {
+            format!("{count} {}", plural(count, one, more))
+        };
         write!(
             f,
             "{} of {} in {}, {} ({creases} of them creases), {}",

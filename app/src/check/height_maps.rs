@@ -7,7 +7,7 @@ use super::measures::{Measures, short};
 use crate::rig::Rig;
 use haptics::{Entity, HeightMap, HeightSurvey};
 
-/// What is suspicious of each, the measures being those of the entities.
+/// Suspicions of each, the measures being those of the entities.
 pub(super) fn all(rig: &Rig, entities: &[Entity], measures: &[Measures]) -> Vec<String> {
     let felt = rig.scene.entities.iter().zip(entities).zip(measures).filter(|((spec, _), _)| spec.is_haptic);
     felt.flat_map(|((_, entity), it)| {
@@ -38,11 +38,11 @@ fn deep(map: &HeightMap, it: &Measures) -> Option<String> {
     let size_m = it.size_m?;
     let (thin_m, long_m) = (size_m.into_iter().fold(f64::INFINITY, f64::min), it.length_m()?);
     let lengths_m = "`amplitude_m` is in metres";
-    if -low_m > 0.5 * thin_m {
+    if -low_m > thin_m {
         let (deep, thin) = (short(-low_m), short(thin_m));
         return Some(format!(
-            "the height map of {} is {deep} m deep, and the thing {thin} m thick: in its dents fingers get through to the other \
-             side; {lengths_m}",
+            "the height map of {} is {deep} m deep, and the thing {thin} m thick: the bottom of its dents is felt beyond its \
+             other side; {lengths_m}",
             it.name
         ));
     }
@@ -52,7 +52,7 @@ fn deep(map: &HeightMap, it: &Measures) -> Option<String> {
     })
 }
 
-/// Where touch begins at the surface below the heights.
+/// Touch that begins at the surface below the heights.
 fn step(entity: &Entity, map: &HeightMap, it: &Measures) -> Option<String> {
     let [_, high_m] = map.range_m();
     let step_n = if map.lift_m(&entity.shape, 0.0) > 0.0 { 0.0 } else { entity.stiffness_n_per_m * high_m };

@@ -19,7 +19,7 @@ const SAMPLE_BYTES: usize = 64;
 /// So many pieces are known at most, besides the last two; an even number.
 const MOST: usize = 64;
 
-/// What is known of a file's content.
+/// Samples of a file's content.
 #[derive(Debug)]
 pub(super) struct Marks {
     /// `None`: it cannot be read, or nothing was written yet.
@@ -80,7 +80,7 @@ impl Marks {
         }
     }
 
-    /// Where the last piece ends.
+    /// End of the last piece.
     pub(super) fn end(&self) -> u64 {
         self.end
     }

@@ -568,7 +568,7 @@ impl Write for WholeWrites {
 
 #[cfg(test)]
 mod tests {
-    use super::super::opened::OtherLength;
+    use super::super::opened::OtherContent;
     use super::*;
     use std::path::Path;
 
@@ -606,6 +606,6 @@ mod tests {
         whole.beginning.has_rows.store(true, Ordering::Relaxed);
         whole.write_all(b"chunk").and_then(|()| whole.flush()).expect("room");
         std::fs::write(&path, "").expect("room");
-        assert!(OtherLength::of(&whole.sync().expect_err("another length")).is_some());
+        assert!(OtherContent::of(&whole.sync().expect_err("another length")).is_some());
     }
 }

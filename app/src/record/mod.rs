@@ -34,7 +34,7 @@ pub(crate) use content::{Content, ContentState};
 pub use events_file::EventsFile;
 pub use files::Files;
 pub use mcap_file::McapFile;
-pub use opened::{Opened, OtherLength, begin_all};
+pub use opened::{Opened, OtherContent, begin_all};
 pub use record_file::RecordFile;
 pub use recorder::{EventFeed, Recorded, Recorder};
 pub use view::View;

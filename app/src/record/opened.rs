@@ -51,7 +51,7 @@ pub struct Opened {
     /// Length of the content, and with noise behind it that could not be cut off.
     noisy: Cell<Option<[u64; 2]>>,
     content: Arc<ContentState>,
-    /// What was written; `None`: to a stream, or to somebody else's file.
+    /// Samples of the writing; `None`: to a stream, or to somebody else's file.
     marks: Option<Marks>,
 }
 
@@ -417,7 +417,7 @@ impl Opened {
     /// A hole or the bytes of others would be taken for a part of the recording.
     ///
     /// # Errors
-    /// [`OtherLength`], of a file that somebody else has cut or written; it cannot be looked at.
+    /// [`OtherContent`], of a file that somebody else has cut or written; it cannot be looked at.
     pub(super) fn check_lately(&self, written_bytes: u64) -> io::Result<()> {
         self.check(written_bytes, Marks::changed_lately)
     }
@@ -445,18 +445,18 @@ impl Opened {
         found.map_or(Ok(()), |found| Err(io::Error::other(found)))
     }
 
-    /// What others have done to it, if they have.
+    /// Change that others have made to it, if they have.
     fn found_of_others(
         &self,
         written_bytes: u64,
         marks: &Marks,
         changed: impl Fn(&Marks) -> io::Result<Option<u64>>,
-    ) -> io::Result<Option<OtherLength>> {
+    ) -> io::Result<Option<OtherContent>> {
         let found_bytes = self.file.metadata()?.len();
         if found_bytes != written_bytes {
-            return Ok(Some(OtherLength::Length { found_bytes, written_bytes }));
+            return Ok(Some(OtherContent::Length { found_bytes, written_bytes }));
         }
-        Ok(changed(marks)?.map(|at| OtherLength::Bytes { at }))
+        Ok(changed(marks)?.map(|at| OtherContent::Bytes { at }))
     }
 
     /// Cuts it to so many bytes, if it has more.
@@ -481,9 +481,9 @@ impl Opened {
     }
 }
 
-/// What is found in a file that another process has cut or written while it was recorded into.
+/// Content of a file that another process has cut or written while it was recorded into.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
-pub enum OtherLength {
+pub enum OtherContent {
     /// It is longer or shorter.
     #[error("it has {found_bytes} bytes where {written_bytes} were written")]
     Length {
@@ -500,7 +500,7 @@ pub enum OtherLength {
     },
 }
 
-impl OtherLength {
+impl OtherContent {
     /// The one that the error is about, if it is.
     pub(crate) fn of(error: &io::Error) -> Option<Self> {
         error.get_ref()?.downcast_ref().copied()

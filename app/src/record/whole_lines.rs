@@ -192,7 +192,7 @@ impl WholeLines {
 
 #[cfg(test)]
 mod tests {
-    use super::super::opened::OtherLength;
+    use super::super::opened::OtherContent;
     use super::*;
 
     #[test]
@@ -254,7 +254,7 @@ mod tests {
             std::fs::write(&path, content).expect("room");
             let refused = line(&mut lines, 4).and_then(|()| lines.flush()).expect_err("another length");
             let told = format!("it has {} bytes where 9 were written", content.len());
-            assert_eq!(OtherLength::of(&refused).expect("another length").to_string(), told);
+            assert_eq!(OtherContent::of(&refused).expect("another length").to_string(), told);
             assert!([lines.sync(), lines.keep()].iter().all(Result::is_err));
             drop(lines);
             assert_eq!(std::fs::read_to_string(&path).expect("there"), content);
@@ -283,8 +283,8 @@ mod tests {
                 } else {
                     line(&mut lines, 4).and_then(|()| lines.flush())
                 };
-                let found = OtherLength::of(&refused.expect_err("other bytes")).expect("others' doing");
-                assert_eq!(found, OtherLength::Bytes { at: content.len() as u64 });
+                let found = OtherContent::of(&refused.expect_err("other bytes")).expect("others' doing");
+                assert_eq!(found, OtherContent::Bytes { at: content.len() as u64 });
                 drop(lines);
                 assert_eq!(path.metadata().expect("there").len(), 9);
                 std::fs::remove_file(&path).expect("our own");

@@ -234,7 +234,7 @@ pub fn is_named(file: &Path) -> bool {
     ENDINGS.iter().any(|(name, _)| ending.eq_ignore_ascii_case(name)) || foreign::foreign(file, b"").is_some()
 }
 
-/// Whether a file is a model: its name says so, or says neither that nor that it is a scene, and its content does.
+/// True for a model: its name says so, or says neither that nor that it is a scene, and its content does.
 pub fn is_model(file: &Path) -> bool {
     let is_toml = file.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("toml"));
     is_named(file) || !is_toml && read_file(file).is_ok_and(|bytes| Format::by_content(&bytes).is_some())

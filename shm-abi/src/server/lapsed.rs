@@ -3,11 +3,11 @@
 //! Problem: as long as an offer stands nobody else gets one; who asks, takes no lease and asks again would keep everybody from
 //! commanding. And whoever takes offers away must not keep others from it in turn.
 //! Model: an offer that nobody has mapped for [`MAPPED_WITHIN`] gives way to another user. Whoever lets that happen, keeps his
-//! memory from being sealed, however that is done, or hands a second offer back within [`REMEMBERED`], has lapsed: for that time his offers give
+//! memory from being sealed, or hands a second offer back within [`REMEMBERED`], has lapsed: for that time his offers give
 //! way at once, to whoever has not lapsed. It is his own loss: without others he commands as before. Administrators take
-//! every offer of others, give theirs to none but each other, and do not lapse. Whoever's lease they ended waits for that
-//! time: else he who asks at once has it again before anybody else. More users than [`MOST`] at once are not
-//! remembered, the oldest first.
+//! every offer of others, give theirs to none but each other, and do not lapse. A user whose lease they ended waits for that
+//! time: else he who asks at once has it again before anybody else. More users than [`MOST`] at once are not remembered, the
+//! oldest first.
 //! Limit: users that cannot be told apart lapse together, and are told from each other only by time.
 
 use std::time::{Duration, Instant};

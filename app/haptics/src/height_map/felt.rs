@@ -1,9 +1,8 @@
 //! Heights as they are felt from tick to tick: never steeper than [`HeightMap::STEEPEST`].
 //!
 //! Problem: a picture may have cliffs of centimetres from one texel to the next, and noise that no way of a hand explains.
-//! Model: what is felt follows the picture as the finger goes, by [`HeightMap::STEEPEST`] of its way at most; the slope follows by
-//! [`LEAN_PER_M`] of it. A touch begins with what the
-//! picture says; over a dent, where nothing is felt, it goes on.
+//! Model: the height that is felt follows the picture as the finger goes, by [`HeightMap::STEEPEST`] of its way at most; the slope
+//! follows by [`LEAN_PER_M`] of it. A touch begins with the picture's own; over a dent, where nothing is felt, it goes on.
 //! Invariant: a picture that is nowhere steeper, and leans over more slowly, is felt as it is, to the bit.
 
 use super::{Height, HeightMap};
@@ -11,17 +10,17 @@ use super::{Height, HeightMap};
 /// Change of the slope by the way \[1/m\]: waves of 1 mm that are as steep as 0.8 lean over as fast.
 const LEAN_PER_M: f64 = 5000.0;
 
-/// What was felt in the last tick of a touch.
+/// Height that was felt in the last tick of a touch.
 #[derive(Debug, Clone, Copy, Default)]
 pub(crate) struct FeltHeight(Option<Height>);
 
-/// What is felt now.
+/// Height that is felt now.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Step {
     pub(super) height: Height,
-    /// How much higher or lower than in the last tick \[m\]; in the first one, how high or deep.
+    /// Difference from the last tick \[m\]; in the first one, height or depth.
     pub(super) change_m: f64,
-    /// By how much it leans otherwise.
+    /// Change of the slope.
     pub(super) lean: f64,
 }
 

@@ -1,4 +1,4 @@
-//! What heights are like over a whole surface: how steep, and how high and deep.
+//! Steepness of heights over a whole surface.
 //!
 //! Model: a few thousand places of the surface, spread at random but the same each time: of a mesh over its faces by their
 //! area, of a plane over one picture, of other forms the points nearest to places in and around the box about them.
@@ -7,7 +7,7 @@
 use nalgebra::Vector3;
 
 use super::{HeightMap, PictureScale};
-use crate::mesh::Mesh;
+use crate::mesh::{Mesh, area_vector};
 use crate::shape::{Form, Shape};
 use crate::surface::{Feature, Surface, SurfacePoint};
 
@@ -43,7 +43,7 @@ impl HeightMap {
             Shape::Mesh(mesh) => {
                 let sums: Vec<f64> = (0..mesh.faces().len() as u32)
                     .scan(0.0, |sum, face| {
-                        *sum += area_m2(mesh, face);
+                        *sum += area_vector(&corners(mesh, face)).norm();
                         Some(*sum)
                     })
                     .collect();
@@ -65,24 +65,18 @@ impl HeightMap {
         if let (Form::Plane(_), PictureScale::Size([width_m, height_m])) = (form, self.scale) {
             return Some(Vector3::repeat(0.5 * width_m.max(height_m)));
         }
-        let far_m = FAR_M;
         // The farthest points along each axis.
         let half = Vector3::from_fn(|axis, _| {
             let mut way = Vector3::zeros();
-            way[axis] = far_m;
+            way[axis] = FAR_M;
             form.nearest(&way).point_B[axis].abs().max(form.nearest(&-way).point_B[axis].abs())
         });
-        (half.amax() < far_m).then_some(half)
+        (half.amax() < FAR_M).then_some(half)
     }
 }
 
 fn corners(mesh: &Mesh, face: u32) -> [Vector3<f64>; 3] {
     mesh.faces()[face as usize].vertices.map(|vertex| mesh.vertices()[vertex as usize])
-}
-
-fn area_m2(mesh: &Mesh, face: u32) -> f64 {
-    let [a, b, c] = corners(mesh, face);
-    0.5 * (b - a).cross(&(c - a)).norm()
 }
 
 /// A point of a face, by two numbers from 0 to 1, evenly over its area.

@@ -63,7 +63,7 @@ fn unused(soup: &TriangleSoup) -> Finding {
 }
 
 /// Twice the area vector, from the two shortest edges: the long ones of a needle would cancel.
-pub(super) fn area_vector([a, b, c]: &[Vector3<f64>; 3]) -> Vector3<f64> {
+pub(crate) fn area_vector([a, b, c]: &[Vector3<f64>; 3]) -> Vector3<f64> {
     let [ab, bc, ca] = [b - a, c - b, a - c];
     let [l_ab, l_bc, l_ca] = [ab, bc, ca].map(|edge| edge.norm_squared());
     if l_ab >= l_bc && l_ab >= l_ca {

@@ -77,7 +77,7 @@ fn over_cliffs_and_noise_the_force_follows_the_way_of_the_hand() {
     }
 }
 
-/// Where a cliff has been passed, its whole height is felt once the finger has gone half of that.
+/// The whole height of a cliff is felt once the finger has gone half of that beyond it.
 #[test]
 fn behind_a_cliff_its_whole_height_is_felt() {
     let cliff = picture(SIDE, |u, _| f64::from(u > 0.5));

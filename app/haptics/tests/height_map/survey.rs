@@ -1,4 +1,4 @@
-//! What heights are like all over a surface, against waves.
+//! Steepness of heights all over a surface, against waves.
 
 use crate::common::pictures::*;
 use haptics::mesh::{Mesh, TriangleSoup};

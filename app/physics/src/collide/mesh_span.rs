@@ -147,7 +147,7 @@ impl Standing<'_> {
         Linear::new(-self.height.along_B, level_m - self.height.base)
     }
 
-    /// What lies deepest may be another limb in each tick.
+    /// Motion in which another limb may lie deepest in each tick.
     fn is_fast(&self) -> bool {
         self.travel_m > FAST_M
     }
@@ -189,7 +189,7 @@ impl Standing<'_> {
     }
 }
 
-/// What goes farther in a tick is sought anew, and keeps nobody \[m\].
+/// Way in a tick from which on all are sought anew, and nobody is kept \[m\].
 const FAST_M: f64 = 1e-3;
 /// So many times as deep as all that were chosen must be what takes D's place.
 const DEEPER: f64 = 1.5;
