@@ -36,6 +36,7 @@ mod error;
 mod face;
 mod facing;
 mod fan;
+mod fit;
 mod fold;
 mod hole;
 mod junction;
@@ -94,8 +95,6 @@ pub struct Mesh {
     sides: Sides,
     /// Whether any part is closed.
     has_inside: bool,
-    /// Presence of a part that lies beside another one.
-    has_cracks: bool,
     extent_m: f64,
     /// Of all meshes that this process has built, which. An address would be another mesh's as soon as this one is gone.
     identity: u64,
@@ -133,7 +132,7 @@ impl Mesh {
             face.sides = Sides::Sheet;
             (face.is_crossed, face.is_beside, face.is_at_ledge) = (false, false, false);
         }
-        Self { sides: Sides::Sheet, has_inside: false, has_cracks: false, ..self }
+        Self { sides: Sides::Sheet, has_inside: false, ..self }
     }
 
     /// Solid if all of its parts are; each [`Face`] says it of its own part.

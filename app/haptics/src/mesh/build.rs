@@ -103,21 +103,16 @@ impl Mesh {
         let vertices = vertices.into_boxed_slice();
         let bvh = Bvh::build(&faces, &vertices);
         let identity = BUILT.fetch_add(1, Ordering::Relaxed);
-        let mut mesh = Self {
-            faces,
-            vertices,
-            bvh,
-            sides,
-            has_inside,
-            extent_m,
-            identity,
-            uv: None,
-            labels: None,
-            has_cracks: false,
-        };
+        let mut mesh =
+            Self { faces, vertices, bvh, sides, has_inside, extent_m, identity, uv: None, labels: None };
         report.crossed = mesh.mark_crossed();
         mesh.turn_outward(&parts, &mut report);
-        report.narrow_gaps = mesh.mark_beside(&parts);
+        let fitting;
+        (report.narrow_gaps, fitting) = mesh.mark_beside(&parts);
+        mesh.fit(&parts, &fitting, &mut report.narrow_gaps);
+        if report.narrow_gaps.moved > 0 {
+            mesh.mark_crossed();
+        }
         mesh.mark_ledges();
         Ok((mesh, report))
     }
@@ -135,12 +130,16 @@ fn link_again(
     topology::link(triangles, vertices, report)
 }
 
-/// Its offset is the middle of those of its corners, so that none of them is further from the plane than needed.
+/// Normal and offset of a face: the middle of those of its corners, so that none of them is further from the plane than needed.
+pub(super) fn plane_of(corners: &[Vector3<f64>; 3]) -> (Vector3<f64>, f64) {
+    let normal_B = area_vector(corners).normalize();
+    let [a, b, c] = corners.map(|corner| normal_B.dot(&corner));
+    (normal_B, 0.5 * (a.min(b).min(c) + a.max(b).max(c)))
+}
+
 fn face(triangle: &Triangle, links: &[Link; 3], sides: Sides, vertices: &[Vector3<f64>]) -> Face {
     let corners = triangle.corners.map(|v| vertices[v as usize]);
-    let normal_B = area_vector(&corners).normalize();
-    let [a, b, c] = corners.map(|corner| normal_B.dot(&corner));
-    let offset_m = 0.5 * (a.min(b).min(c) + a.max(b).max(c));
+    let (normal_B, offset_m) = plane_of(&corners);
     Face {
         normal_B,
         offset_m,

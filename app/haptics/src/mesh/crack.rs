@@ -1,8 +1,8 @@
 //! Hairline cracks and ledges between parts that lie side by side: a point slides over them.
 //!
-//! Problem: where a walk comes to the edge of a part, the surface may go on with another part, behind a crack of a few
-//! micrometres or roundings. No edge leads there; and a HIP below that edge is in front of the part's wall: it would be free,
-//! or held by the other part's wall in the crack, along the surface instead of out of it.
+//! Problem: where a walk comes to the edge of a part, the surface may go on with another part, higher or lower by a few
+//! micrometres or roundings. No edge leads there, and a ledge that stands straight would hold the god-object for good. Cracks
+//! between walls are closed on loading ([`fit`](super::fit)), but for those of very small faces.
 //!
 //! Model: a step (as characters in games step over kerbs): up by 1.5 times [`widest_m`] off the face that holds the HIP, on along
 //! it by twice that width, and down again. If nothing is in the way and the way down meets a face that looks the same way, the
@@ -10,25 +10,20 @@
 //! then it goes over. Going back is the same, so there is no point from which both parts are left in turn.
 //! Overlapping parts: the wall of one stands in the way over the other; if it is no higher than a step, the walk goes on upon
 //! it.
-//! Walls in a crack hold nothing: at an edge, a face that is none has precedence, and a flight that comes to the rim of one
-//! leads past. A wall is in a crack if 1.5 times [`widest_m`] in front of it is inside of a part.
-//! A path that ends in a crack, or at one of its walls, is tried once more a step to the side, over the part that is there.
 //!
 //! Frames and signs: object frame B; `out` is along a face, away from it.
 //! Invariant: whatever is passed over is narrower than twice [`widest_m`] and lower than 1.5 times that.
-//! Limit: where walls coincide to the bit, a finger that is lifted off right above them, within a step, may come to one of
-//! them, as it did without all this (one in 2000 of the test's assemblies). A part that hovers above the face of another one,
-//! nearer than that but without touching it, stands in nobody's way along that face: a point slides in below.
+//! Limit: a part that hovers above the face of another one, nearer than a step but without touching it or a wall of its own size,
+//! stands in nobody's way along that face: a point slides in below.
 //! Cost: nothing where no other part is near ([`beside`](super::beside)); else up to five questions to the hierarchy for each
 //! direction, at most [`MOST_WAYS`], where an edge or a vertex lets the HIP go, and one where it holds.
 
 use nalgebra::Vector3;
 
+use super::Mesh;
 use super::beside::widest_m;
 use super::fan::for_each_around;
 use super::place::{Facet, On, Place, Side, previous};
-use super::walk::RIM;
-use super::{Hit, Mesh};
 
 /// Place beyond an edge at which a surface goes on.
 pub(super) enum Beyond {
@@ -184,53 +179,6 @@ pub(super) fn off_crossing(
     })
 }
 
-/// True for a flight from outside that came at once to a wall in a crack, at its rim: it leads past.
-#[cold]
-pub(super) fn is_in_crack(mesh: &Mesh, from_B: &Vector3<f64>, place: &Place, hip_B: &Vector3<f64>) -> bool {
-    let facet = Facet::of(mesh, place.on.side());
-    let [a_B, b_B, c_B] = facet.corners_B(mesh);
-    let inward_B = ((a_B + b_B + c_B) / 3.0 - place.point_B).try_normalize(0.0).unwrap_or_default();
-    let within_B = place.point_B + inward_B * (2.0 * widest_m(mesh.extent_m));
-    facet.face.is_beside
-        && !mesh.is_inside(hip_B)
-        && has_part_before(mesh, &within_B, &facet.normal_B)
-        && (place.point_B - from_B).amax() <= RIM * mesh.extent_m
-        // Within another part it may be what holds the HIP in a corner.
-        && !mesh.is_inside(&(within_B + facet.normal_B * (RIM * mesh.extent_m)))
-}
-
-/// Place at which a path that ends in a crack, or at a wall in it, met the surface that the crack is in; `None` if it is in none.
-#[cold]
-pub(super) fn mouth(
-    mesh: &Mesh,
-    from_B: &Vector3<f64>,
-    to_B: &Vector3<f64>,
-    hit: Option<&Hit>,
-) -> Option<Place> {
-    let widest_m = widest_m(mesh.extent_m);
-    // Of the wall that is near, where, and the way into its part.
-    let (wall, at_B, into_B) = match hit {
-        Some(hit) => {
-            let normal_B = Facet::of(mesh, Place::hit(hit).on.side()).normal_B;
-            (hit.face, hit.point_B, -normal_B)
-        }
-        None => {
-            let near = mesh.nearest_within(to_B, widest_m).ok()??;
-            (near.face, near.point_B, (near.point_B - to_B).try_normalize(0.0)?)
-        }
-    };
-    if !mesh.faces[wall as usize].is_beside {
-        return None;
-    }
-    if !has_part_before(mesh, &at_B, &-into_B) {
-        return None;
-    }
-    let aside_B = into_B * (2.0 * widest_m);
-    let met = mesh.first_hit(&(from_B + aside_B), &(to_B + aside_B))?;
-    let is_beside = Facet::of(mesh, Place::hit(&met).on.side()).normal_B.dot(&into_B).abs() < ALIKE;
-    is_beside.then(|| Place::hit(&met))
-}
-
 /// True if another part is so near in front of a wall, and faces it, that there is no crack to a finger, or hides it.
 fn has_part_before(mesh: &Mesh, at_B: &Vector3<f64>, normal_B: &Vector3<f64>) -> bool {
     let before_B = at_B + normal_B * (STEP * widest_m(mesh.extent_m));
@@ -238,61 +186,6 @@ fn has_part_before(mesh: &Mesh, at_B: &Vector3<f64>, normal_B: &Vector3<f64>) ->
         && mesh
             .first_hit(at_B, &before_B)
             .is_none_or(|hit| Facet::of(mesh, Place::hit(&hit).on.side()).normal_B.dot(normal_B) < -ALIKE)
-}
-
-/// Feature that holds the HIP back at an edge or a vertex: not a wall in a crack, if there is a face beside it that is none and
-/// behind which the HIP lies, too.
-#[cold]
-pub(super) fn but_no_wall(mesh: &Mesh, place: &Place, on: On, hip_B: &Vector3<f64>) -> On {
-    if place.on == on {
-        return on;
-    }
-    let wall = Facet::of(mesh, on.side());
-    let mut better = None;
-    let mut look = |facet: &Facet<'_>, edges: [usize; 2]| {
-        let is_other = facet.normal_B.dot(&wall.normal_B) < ALIKE && facet.depth_m(hip_B) > 0.0;
-        if is_other && better.is_none() && !is_wall(mesh, facet, edges, &place.point_B) {
-            better = Some(facet.side);
-        }
-    };
-    let is_in_crack = |facet: &Facet<'_>, edges: [usize; 2]| is_wall(mesh, facet, edges, &place.point_B);
-    match place.on {
-        On::Edge(side, edge) => {
-            let here = Facet::of(mesh, side);
-            let link = here.face.links[edge];
-            let Some(over) = side.across(link).map(|side| Facet::of(mesh, side)) else { return on };
-            let (here, over) = ((here, [edge; 2]), (over, [link.edge(); 2]));
-            let (held, other) = if on.side() == side { (here, over) } else { (over, here) };
-            if held.0.normal_B.dot(&other.0.normal_B) < ALIKE && is_in_crack(&held.0, held.1) {
-                look(&other.0, other.1);
-            }
-        }
-        On::Vertex(side, corner) => {
-            let mut is_held_by_wall = false;
-            for_each_around(mesh, side, corner, |sector| {
-                let edges = [sector.corner, previous(sector.corner)];
-                is_held_by_wall |= sector.facet.side == wall.side && is_in_crack(&sector.facet, edges);
-            });
-            if is_held_by_wall {
-                for_each_around(mesh, side, corner, |sector| {
-                    look(&sector.facet, [sector.corner, previous(sector.corner)]);
-                });
-            }
-        }
-        On::Face(_) | On::Crossing(..) => {}
-    }
-    better.map_or(on, On::Face)
-}
-
-/// True for a face that is a wall in a crack, as seen from a little within it.
-fn is_wall(mesh: &Mesh, facet: &Facet<'_>, edges: [usize; 2], at_B: &Vector3<f64>) -> bool {
-    let inward = |edge: usize| {
-        let (_, edge_B) = facet.edge_B(mesh, edge);
-        facet.inward_B(&edge_B).try_normalize(0.0).unwrap_or_default()
-    };
-    let inward_B = inward(edges[0]) + if edges[1] == edges[0] { Vector3::zeros() } else { inward(edges[1]) };
-    let within_B = at_B + inward_B * (2.0 * widest_m(mesh.extent_m));
-    has_part_before(mesh, &within_B, &facet.normal_B)
 }
 
 /// Height of a step, in widths of the widest crack: over a ledge of that height.

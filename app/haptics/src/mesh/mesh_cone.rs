@@ -16,7 +16,6 @@ use nalgebra::Vector3;
 use std::cell::Cell;
 
 use super::Mesh;
-use super::crack::mouth;
 use super::draw::{Against, Frictionless};
 use super::place::Place;
 use super::walk::{Walked, stand, walk};
@@ -165,13 +164,7 @@ impl MeshCone {
         if self.clear.has(&from_B) && self.clear.has(hip_B) {
             return None;
         }
-        let hit = mesh.first_hit(&from_B, hip_B);
-        if mesh.has_cracks
-            && let Some(place) = mouth(mesh, &from_B, hip_B, hit.as_ref())
-        {
-            return Some((place, Beginning::Came));
-        }
-        if let Some(hit) = hit {
+        if let Some(hit) = mesh.first_hit(&from_B, hip_B) {
             return Some((Place::hit(&hit), Beginning::Came));
         }
         self.clear = Clear { centre_B: *hip_B, radius_m: mesh.clearance(hip_B, mesh.extent_m()) };

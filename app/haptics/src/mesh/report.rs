@@ -71,11 +71,15 @@ pub struct NarrowGaps {
     pub widest_m: f64,
     /// The middle of one of them (m).
     pub first_B: Option<[f64; 3]>,
+    /// Number of vertices of walls that were moved outward, so that the parts overlap.
+    pub moved: usize,
+    /// Bound on how far these walls were moved (m).
+    pub moved_by_m: f64,
 }
 
 impl fmt::Display for NarrowGaps {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self { faces, widest_m, first_B } = self;
+        let Self { faces, widest_m, first_B, moved, moved_by_m } = self;
         let has = plural(*faces, "face lies", "faces lie");
         let widest = short(*widest_m);
         write!(f, "{faces} {has} beside another part, {widest} m away or less")?;
@@ -83,10 +87,17 @@ impl fmt::Display for NarrowGaps {
             let [x, y, z] = at.map(|x| if x.abs() < ROUNDING { 0.0 } else { short(x) });
             write!(f, " (one at [{x}, {y}, {z}])")?;
         }
-        write!(
-            f,
-            ": a point slides over such gaps; join the parts in the program that made them if they are one"
-        )
+        f.write_str(
+            ": a point slides over such gaps; join the parts in the program that made them if they are one",
+        )?;
+        if *moved > 0 {
+            let (vertices, by) = (plural(*moved, "vertex", "vertices"), short(*moved_by_m));
+            write!(
+                f,
+                " ({moved} {vertices} of their walls moved outward by {by} m, so that the parts overlap)"
+            )?;
+        }
+        Ok(())
     }
 }
 

@@ -68,7 +68,7 @@ pub(crate) struct Walked {
 pub(crate) fn stand(mesh: &Mesh, mut place: Place, input: &ConeInput) -> Option<(Place, TangentView)> {
     let hip_B = input.hip_B;
     for flight in 0..MAX_FLIGHTS {
-        if let Some(mut on) = facing(mesh, place, hip_B) {
+        if let Some(on) = facing(mesh, place, hip_B) {
             let face = &mesh.faces[place.face() as usize];
             // What holds the HIP goes on holding it where there are too many ledges.
             let may_step = flight + 1 < MAX_FLIGHTS;
@@ -79,14 +79,13 @@ pub(crate) fn stand(mesh: &Mesh, mut place: Place, input: &ConeInput) -> Option<
                 place = next;
                 continue;
             }
-            if may_step && face.is_beside {
-                match held_beside(mesh, &place, on, &hip_B) {
-                    Held::By(other) => on = other,
-                    Held::Over(next) => {
-                        place = next;
-                        continue;
-                    }
-                }
+            if may_step
+                && face.is_beside
+                && let On::Crossing(side, other) = on
+                && let Some(next) = crack::off_crossing(mesh, &place.point_B, [side, other], &hip_B)
+            {
+                place = next;
+                continue;
             }
             let (normal_B, offset_m) = match on {
                 On::Face(side) => plane_of_face(mesh, side),
@@ -109,23 +108,6 @@ pub(crate) fn stand(mesh: &Mesh, mut place: Place, input: &ConeInput) -> Option<
     None
 }
 
-/// Feature that holds the HIP back beside another part, or the place at which the surface goes on there.
-enum Held {
-    By(On),
-    Over(Place),
-}
-
-#[cold]
-#[inline(never)]
-fn held_beside(mesh: &Mesh, place: &Place, on: On, hip_B: &Vector3<f64>) -> Held {
-    if let On::Crossing(side, other) = on
-        && let Some(next) = crack::off_crossing(mesh, &place.point_B, [side, other], hip_B)
-    {
-        return Held::Over(next);
-    }
-    Held::By(crack::but_no_wall(mesh, place, on, hip_B))
-}
-
 /// Off the surface: over a crack, or on to what is met in flight; `None`: free.
 #[inline(never)]
 fn leave(mesh: &Mesh, place: Place, hip_B: Vector3<f64>) -> Option<Beyond> {
@@ -133,9 +115,7 @@ fn leave(mesh: &Mesh, place: Place, hip_B: Vector3<f64>) -> Option<Beyond> {
     if is_beside && let Some(beyond) = crack::beyond(mesh, place, &hip_B) {
         return Some(beyond);
     }
-    let landed = fly(mesh, place, hip_B)?;
-    let is_past = is_beside && crack::is_in_crack(mesh, &place.point_B, &landed, &hip_B);
-    (!is_past).then_some(Beyond::At(landed))
+    fly(mesh, place, hip_B).map(Beyond::At)
 }
 
 /// On an edge or a vertex that holds the HIP back though it lies beyond: above a crack.

@@ -139,7 +139,6 @@ impl Tiles {
 #[test]
 fn a_point_slides_over_hairline_cracks_as_over_one_surface() {
     let (mut touched, mut wrong) = (0, Vec::new());
-    // Of ten times as many one was wrong: see the limit in `crack.rs`.
     for seed in 0..200 {
         let mut noise = Noise(seed);
         let tiles = Tiles::new(&mut noise);

@@ -23,6 +23,7 @@ mod nesting;
 mod outlying;
 mod overlaps;
 mod parts;
+mod pins;
 mod plates;
 mod queries;
 mod unfolded;

@@ -205,7 +205,13 @@ impl<'l, L: Leaving> Segment<'l, L> {
         let is_vague =
             before <= 0.0 || after > 0.0 || before <= self.tolerance_m && after >= -self.tolerance_m;
         let corners = triangles.corners(face);
-        let is_met = if is_vague { self.touches(face, &corners, fraction) } else { line.meets(&corners) };
+        let touches = || self.touches(face, &corners, fraction);
+        // Right in front of the plane: so may the start be beside the rim of a face at a concave edge.
+        let is_met = if is_vague {
+            touches()
+        } else {
+            line.meets(&corners) || before <= self.tolerance_m && touches()
+        };
         is_met.then_some(Met { face: index, fraction, is_front })
     }
 
