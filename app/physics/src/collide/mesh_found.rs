@@ -84,12 +84,15 @@ impl Found {
             (at >= begin || one.normal_M.dot(&contact.normal_M) > AGREES)
                 && (one.on_mesh_M - contact.on_mesh_M).norm_squared() < together_m * together_m
         };
-        if self.contacts[..self.count].iter().enumerate().any(is_there) {
-            return;
-        }
+        let there = self.contacts[..self.count].iter().enumerate().position(|one| is_there(one));
         contact.carried = self.carried.contains(&contact.id);
         contact.id |= (self.patch as u32) << PATCH_SHIFT;
-        if let Some(place) = self.contacts.get_mut(self.count) {
+        if let Some(there) = there {
+            // Of two right above each other the lower one presses: of both rims of a coin.
+            if there >= begin && contact.gap_m < self.contacts[there].gap_m - together_m {
+                self.contacts[there] = contact;
+            }
+        } else if let Some(place) = self.contacts.get_mut(self.count) {
             *place = contact;
             self.count += 1;
         }

@@ -7,12 +7,12 @@ use haptics::{Form, Surface};
 use nalgebra::{Isometry3, Point3, Vector3};
 
 use super::Stands;
-use super::convex::Convex;
+use super::convex::{Convex, Core};
 use super::mesh_corner::Corner;
 use super::mesh_cut::Edge;
 use super::mesh_own::{Own, Owns, owns_of_form};
 use super::mesh_patch::Patch;
-use super::mesh_see::{Seen, Side, at_form, in_box, see, see_side};
+use super::mesh_see::{Seen, Side, in_box, in_form, see, see_side};
 use super::mesh_span::Standing;
 
 /// The other one, placed in the mesh's frame.
@@ -111,7 +111,7 @@ impl Other<'_> {
         let along = self.X_MO.inverse_transform_vector(along_M);
         let seen = match self.solid {
             Solidity::Form(Form::Cuboid(cuboid)) => in_box(cuboid, &point, &along, deep_m),
-            Solidity::Form(form) => at_form(*form, &point),
+            Solidity::Form(form) => in_form(form, &point, &along, deep_m),
             Solidity::Mesh(mesh) => see(mesh, &point, &along, deep_m),
         };
         Seen { out: self.X_MO * seen.out, gap_m: seen.gap_m }
@@ -165,6 +165,13 @@ impl Other<'_> {
             (Solidity::Mesh(mesh), Some(corner)) => corner.sticks_out(mesh),
             _ => true,
         }
+    }
+
+    /// The point of an ellipsoid that lies farthest against a direction: the only one of its own.
+    pub(super) fn lowest(&self, up_M: &Vector3<f64>) -> Option<Vector3<f64>> {
+        let Solidity::Form(form) = self.solid else { return None };
+        let convex = Convex::of(form, &self.X_MO)?;
+        matches!(convex.core, Core::Ellipsoid { .. }).then(|| convex.support(&-up_M))
     }
 
     /// A point that no other one of it passes in this direction; of a mesh, about where they meet.

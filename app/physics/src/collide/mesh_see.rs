@@ -2,7 +2,9 @@
 
 use haptics::mesh::{Mesh, Sides};
 use haptics::{Cuboid, Feature, Form, Surface};
-use nalgebra::Vector3;
+use nalgebra::{Isometry3, Vector3};
+
+use super::convex::Convex;
 
 /// Where a point is with regard to a surface.
 #[derive(Debug, Clone, Copy)]
@@ -21,7 +23,7 @@ pub(super) fn in_box(cuboid: &Cuboid, point: &Vector3<f64>, along: &Vector3<f64>
     let half_m = Vector3::from(cuboid.size_m()) * 0.5;
     let depth_m = half_m[axis] - point[axis] * along[axis].signum();
     let is_through = if gap_m <= 0.0 {
-        depth_m < MUCH * -gap_m + LITTLE_M
+        depth_m < deep_m.max(MUCH * -gap_m + LITTLE_M)
     } else {
         let is_beside = (0..3).any(|other| other != axis && point[other].abs() > half_m[other]);
         (0.0..=deep_m).contains(&depth_m) && !is_beside
@@ -44,6 +46,51 @@ pub(super) fn at_form(form: Form, point: &Vector3<f64>) -> Seen {
     }
 }
 
+/// Of another closed form: the same, by the way along which it was come in by.
+pub(super) fn in_form(form: &Form, point: &Vector3<f64>, along: &Vector3<f64>, deep_m: f64) -> Seen {
+    let seen = at_form(*form, point);
+    let most_m = if seen.gap_m <= 0.0 { deep_m.max(MUCH * -seen.gap_m + LITTLE_M) } else { deep_m };
+    let is_known = seen.gap_m <= 0.0 && seen.out.dot(along) > AGREES;
+    if is_known || seen.gap_m >= most_m || Convex::of(form, &Isometry3::identity()).is_none() {
+        return seen;
+    }
+    exit(form, point, &(along * most_m)).filter(|through| through.out.dot(along) > AGREES).unwrap_or(seen)
+}
+
+/// Out of a convex form, where a way from inside of it or from behind it ends outside: as seen through the surface there.
+fn exit(form: &Form, from: &Vector3<f64>, way: &Vector3<f64>) -> Option<Seen> {
+    let at = |share: f64| from + way * share;
+    let height_m = |share: f64| form.signed_distance(&at(share));
+    if height_m(1.0) <= 0.0 {
+        return None;
+    }
+    // The distance is convex along the way: inside, if anything is, is where it is least.
+    let (mut low, mut high) = (0.0, 1.0);
+    if height_m(low) > 0.0 {
+        let (mut first, mut last) = (0.0, 1.0);
+        for _ in 0..NARROWINGS {
+            let third = (last - first) / 3.0;
+            let [a, b] = [first + third, last - third];
+            (first, last) = if height_m(a) < height_m(b) { (first, b) } else { (a, last) };
+        }
+        low = 0.5 * (first + last);
+        if height_m(low) > 0.0 {
+            return None;
+        }
+    }
+    for _ in 0..HALVINGS {
+        let middle = 0.5 * (low + high);
+        (low, high) = if height_m(middle) > 0.0 { (low, middle) } else { (middle, high) };
+    }
+    let on_surface = at(high);
+    let out = form.nearest(&on_surface).normal_B;
+    Some(Seen { out, gap_m: out.dot(&(from - on_surface)) })
+}
+
+/// Thirds of a way that are left out until what of it is inside is found: to a thousandth of it.
+const NARROWINGS: usize = 17;
+/// Halves of a way until its end is known: to a part in 1e12.
+const HALVINGS: usize = 40;
 /// Nearer to a surface, the way from there is rounding \[m\].
 const NOTHING_M: f64 = 1e-9;
 
@@ -75,7 +122,7 @@ pub(super) fn see(mesh: &Mesh, point: &Vector3<f64>, along: &Vector3<f64>, deep_
     }
     if face.normal_B.dot(along) < AGREES {
         // From far enough outside back to the point.
-        let most_m = MUCH * nearest.distance_m + LITTLE_M;
+        let most_m = deep_m.max(MUCH * nearest.distance_m + LITTLE_M);
         if let Some(hit) = mesh.first_hit(&(point + along * most_m), point) {
             let through = &mesh.faces()[hit.face as usize];
             if through.normal_B.dot(along) > AGREES {
