@@ -122,7 +122,7 @@ pub fn plan(rig: &Rig, socket: PathBuf, record: PathBuf) -> RunPlan {
 /// A directory that is set and cannot be written, or no room for temporary files.
 pub fn recording_place(directory: Option<&Path>) -> Result<PathBuf, RunFailure> {
     let here = directory.unwrap_or(Path::new("")).join(RECORDING);
-    // It is opened by the run, which may find that another process holds a lock on it.
+    // It is opened by the run, which may find that somebody holds a lock on it.
     let refused = match Opened::open(&here) {
         Err(error) if !output_file::is_claimed(&error) => Some(error),
         _ => None,

@@ -37,7 +37,7 @@ pub enum RecordingError {
     },
     /// Another process holds a lock on it: it writes the file, or reads it.
     #[error(
-        "cannot create the recording {file}: another process holds a lock on it; name another file, or wait until that has ended"
+        "cannot create the recording {file}: somebody holds a lock on it; name another file, or wait until it is released"
     )]
     Claimed {
         /// The file.

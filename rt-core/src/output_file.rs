@@ -45,7 +45,7 @@ pub fn claim(file: &File) -> io::Result<()> {
     }
     match file.try_lock() {
         Err(TryLockError::WouldBlock) => {
-            Err(io::Error::new(io::ErrorKind::ResourceBusy, "another process holds a lock on it"))
+            Err(io::Error::new(io::ErrorKind::ResourceBusy, "somebody holds a lock on it"))
         }
         Ok(()) | Err(TryLockError::Error(_)) => Ok(()),
     }
@@ -139,9 +139,6 @@ mod tests {
         let reader = File::open(&path).expect("it is there");
         reader.lock_shared().expect("nobody else");
         let refused = claim(&file).expect_err("it is locked");
-        assert!(
-            is_claimed(&refused) && refused.to_string() == "another process holds a lock on it",
-            "{refused}"
-        );
+        assert!(is_claimed(&refused) && refused.to_string() == "somebody holds a lock on it", "{refused}");
     }
 }

@@ -7,7 +7,7 @@
 //! is room for all of it. File systems that copy what is written over (btrfs) promise no room: there it is tried behind the
 //! former content, and a copy of that is made first, among the temporary files, and put back if anything is refused. Pipes and
 //! devices are written directly, and so is a file without content whose directory takes no other. A link goes on leading to
-//! its file, which keeps its rights. What lies at the place by then and did not in the beginning is claimed before it is replaced:
+//! its file, which keeps its rights, owner and group; where they cannot be given to another file, its content is written over, too. What lies at the place by then and did not in the beginning is claimed before it is replaced:
 //! a run may record into it. A process that catches signals calls [`abandon_all`] before it ends.
 //! Invariant: at the place there is the former file or the whole new one, whatever ends the process, unless that is
 //! killed while it copies; of an end that nobody catches a draft is left, whose name begins with a dot and ends in `.part`.
@@ -17,10 +17,10 @@
 use crate::{limits, output_file};
 use nix::errno::Errno;
 use nix::fcntl::{AT_FDCWD, FallocateFlags, RenameFlags, fallocate, renameat2};
-use std::fs::{File, Metadata, OpenOptions, Permissions};
+use std::fs::{File, Metadata, OpenOptions};
 use std::io::{self, Read, Seek, Write};
 use std::os::fd::AsRawFd;
-use std::os::unix::fs::{MetadataExt, OpenOptionsExt};
+use std::os::unix::fs::{MetadataExt, OpenOptionsExt, fchown};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Mutex, MutexGuard, PoisonError};
@@ -72,22 +72,22 @@ impl Replacement {
     /// Begins a file that is to be here.
     ///
     /// # Errors
-    /// If it could not take its place: what is there cannot be written or its kind not be told, another process holds a lock on it,
+    /// If it could not take its place: what is there cannot be written or its kind not be told, somebody holds a lock on it,
     /// a pipe without a reader; or there is no place for a draft of what would cost a former content.
     pub fn begin(path: &Path) -> io::Result<Self> {
         let (place, former) = match path.metadata() {
             Ok(found) if found.is_file() && !is_descriptor(path) => {
                 let former = output_file::open(path, OpenOptions::new().write(true))?;
                 output_file::claim(&former)?;
-                (path.canonicalize()?, Some((former, found.permissions())))
+                (path.canonicalize()?, Some((former, found)))
             }
-            Err(error) if error.kind() == io::ErrorKind::NotFound => (target_of(path)?, None),
+            Err(error) if error.kind() == io::ErrorKind::NotFound => (end_of_links(path)?, None),
             // It may be a file with content.
             Err(error) => return Err(error),
             Ok(_) => return Self::directly(path),
         };
-        let (former, rights) = former.unzip();
-        match (create_beside(&place, rights.as_ref()), &former) {
+        let (former, found) = former.unzip();
+        match (create_beside(&place, found.as_ref()), &former) {
             (Ok((file, draft)), _) => Ok(Self::drafted(file, draft, false, place, former)),
             (Err(error), Some(content)) if content.metadata()?.len() > 0 => {
                 let (file, draft) = create_among_temporary_files(&place, &error)?;
@@ -241,8 +241,11 @@ fn is_descriptor(path: &Path) -> bool {
     ["/proc", "/dev/fd", "/dev/stdout", "/dev/stderr"].iter().any(|names| path.starts_with(names))
 }
 
-/// The end of a chain of links at which there is nothing yet.
-fn target_of(path: &Path) -> io::Result<PathBuf> {
+/// The end of a chain of links at which there may be nothing yet.
+///
+/// # Errors
+/// They lead to one another.
+pub fn end_of_links(path: &Path) -> io::Result<PathBuf> {
     let mut place = path.to_path_buf();
     for _ in 0..MOST_LINKS {
         match std::fs::read_link(&place) {
@@ -268,10 +271,10 @@ fn rename_to_nothing(from: &Path, to: &Path) -> io::Result<()> {
     }
 }
 
-/// With the rights of the file whose place it is to take.
-fn create_beside(place: &Path, rights: Option<&Permissions>) -> io::Result<(File, PathBuf)> {
+/// With the rights, the owner and the group of the file whose place it is to take.
+fn create_beside(place: &Path, former: Option<&Metadata>) -> io::Result<(File, PathBuf)> {
     let (file, draft) = create_draft(place, place.parent().unwrap_or(Path::new("")), 0o666)?;
-    match rights.map_or(Ok(()), |rights| file.set_permissions(rights.clone())) {
+    match former.map_or(Ok(()), |former| give_as(&file, former)) {
         Ok(()) => Ok((file, draft)),
         Err(error) => {
             // It cannot take the place of the other one, and nobody else would remove it.
@@ -279,6 +282,15 @@ fn create_beside(place: &Path, rights: Option<&Permissions>) -> io::Result<(File
             Err(error)
         }
     }
+}
+
+fn give_as(file: &File, former: &Metadata) -> io::Result<()> {
+    let own = file.metadata()?;
+    if (own.uid(), own.gid()) != (former.uid(), former.gid()) {
+        fchown(file, Some(former.uid()), Some(former.gid()))?;
+    }
+    // Last, for a change of owner takes some away.
+    file.set_permissions(former.permissions())
 }
 
 /// A draft that nobody else may read, whoever may read the place.
@@ -441,6 +453,7 @@ mod tests {
     use patience::prelude::*;
 
     use super::*;
+    use std::fs::Permissions;
     use std::os::unix::fs::PermissionsExt;
 
     fn names(directory: &Path) -> Vec<String> {
@@ -470,6 +483,20 @@ mod tests {
         assert!(link.symlink_metadata().expect("there").is_symlink());
         assert_eq!(std::fs::read(&place).expect("there"), b"whole");
         assert_eq!(place.metadata().expect("there").permissions().mode() & 0o777, 0o640);
+    }
+
+    #[test]
+    fn the_former_file_keeps_its_owner_and_group_which_takes_root() {
+        let directory = tempfile::tempdir().expect("a directory");
+        let place = directory.path().join("a");
+        std::fs::write(&place, "former").expect("room");
+        if std::os::unix::fs::chown(&place, Some(1), Some(2)).is_err() {
+            return;
+        }
+        std::fs::set_permissions(&place, Permissions::from_mode(0o640)).expect("root may");
+        write(&place, "whole").expect("room");
+        let found = place.metadata().expect("there");
+        assert_eq!((found.uid(), found.gid(), found.mode() & 0o777), (1, 2, 0o640));
     }
 
     #[test]

@@ -37,17 +37,14 @@ pub enum Sent {
     QueueFull,
 }
 
-/// Asks the driver at `socket` for an emergency stop; never waits. Where nobody listens beside that name and it is a symbolic
-/// link, the driver is asked at what that leads to.
+/// Asks the driver at `socket` for an emergency stop; never waits. Where that is a symbolic link, the driver is asked at what it
+/// leads to as well: beside the link may be what a dead driver has left, or a stranger.
 ///
 /// # Errors
 /// If there is no driver, or the kernel does not let us send. That it was sent does not say that it was done: a frame
 /// tells.
 pub fn send(socket: &Path) -> io::Result<Sent> {
     let sent = send_beside(socket);
-    if sent.is_ok() {
-        return sent;
-    }
     match std::fs::canonicalize(socket) {
         Ok(target) if target != socket => send_beside(&target).or(sent),
         _ => sent,

@@ -12,15 +12,18 @@
 //! and not before; what was written over is put back if anything is refused. Until then the first byte is [`HALF_REPLACED`], so
 //! that nobody takes what a killed process leaves for one recording. Any other file begins at once.
 //! Invariant: what was opened and not started is as it was: a file that was made here is removed again, and one that was empty
-//! is emptied, unless it has another content than was written here. Noise that could not be cut off is told, and cut off with this
+//! is emptied, unless it has another content than was written here. A content that others have renamed or changed since it was
+//! opened is not replaced. Noise that could not be cut off is told, and cut off with this
 //! value if that is possible by then. A file whose kind cannot be told is refused.
-//! Limit: what others write between a look at the file and the call that undoes the start (some microseconds) is lost. A content
-//! of others is known by its length and by samples (`marks.rs`), which has limits of its own.
+//! Limit: what others write between a look at the file and the call that undoes the start (some microseconds) is lost; and what
+//! they write over an earlier content in the same tick of the system's clock (4 ms at most) and to the same length. A content of
+//! others is known by its length and by samples (`marks.rs`), which has limits of its own.
 
 use super::content::{Content, ContentState};
 use super::destination::{is_standard_output, shown};
 use super::marks::Marks;
 use crate::recording::RecordingError;
+use rt_core::replacement::end_of_links;
 use rt_core::{limits, output_file};
 use rustix::fs::{FallocateFlags, Mode, OFlags, fallocate};
 use rustix::io::Errno;
@@ -48,6 +51,10 @@ pub struct Opened {
     before: Before,
     /// Room that was asked for behind the content.
     reserved: Cell<Option<Reserved>>,
+    /// Length and last change of the earlier content as it was opened, or as was done to it here.
+    left: Cell<Option<(u64, SystemTime)>>,
+    /// Its name led to it then.
+    was_named: bool,
     /// Length of the content, and with noise behind it that could not be cut off.
     noisy: Cell<Option<[u64; 2]>>,
     content: Arc<ContentState>,
@@ -110,7 +117,7 @@ impl Opened {
     /// Opens the file, or makes it; or gives the standard output another descriptor.
     ///
     /// # Errors
-    /// If the system refuses or cannot tell what it is, it is a pipe that nobody reads, another process holds a lock on it, or there
+    /// If the system refuses or cannot tell what it is, it is a pipe that nobody reads, somebody holds a lock on it, or there
     /// is no standard output.
     pub fn open(path: &Path) -> io::Result<Self> {
         if is_standard_output(path) {
@@ -146,8 +153,12 @@ impl Opened {
         let content = if before == Before::Content { Content::Earlier } else { Content::Replaced };
         let content = Arc::new(ContentState::new(content));
         let marks = (before != Before::Stays).then(Marks::new);
-        let (reserved, noisy) = (Cell::default(), Cell::default());
-        Self { file, path: path.into(), before, reserved, noisy, content, marks }
+        let was_named = marks.is_some() && is_at(&file, path);
+        let (reserved, left, noisy) = (Cell::default(), Cell::default(), Cell::default());
+        let opened =
+            Self { file, path: path.into(), before, reserved, left, was_named, noisy, content, marks };
+        opened.note_as_left();
+        opened
     }
 
     /// As [`Self::open`], for a recording.
@@ -209,17 +220,41 @@ impl Opened {
             return Err(Errno::FBIG.into());
         }
         let found = self.file.metadata()?;
+        self.check_earlier(&found)?;
         let earlier = self.reserved.get();
         let before = earlier.map_or_else(|| found.modified(), |earlier| Ok(earlier.changed[0]))?;
         let reserved = fallocate(&self.file, FallocateFlags::KEEP_SIZE, 0, bytes);
         let now = self.file.metadata()?;
         let is_more = earlier.is_some_and(|earlier| earlier.is_more) || now.blocks() > found.blocks();
         self.reserved.set(Some(Reserved { changed: [before, now.modified()?], is_more }));
+        self.note_as_left();
         match reserved {
             Err(full @ (Errno::NOSPC | Errno::DQUOT | Errno::FBIG)) => Err(full.into()),
             // Of a file system that cannot answer.
             _ => Ok(()),
         }
+    }
+
+    /// Finds out whether its content is the one that is to be replaced, under the name that it is replaced by: who has renamed it
+    /// meanwhile, or written something else into it, keeps that.
+    ///
+    /// # Errors
+    /// It is not.
+    fn check_earlier(&self, found: &Metadata) -> io::Result<()> {
+        let is_as_left = |(bytes, at)| found.len() == bytes && found.modified().is_ok_and(|now| now == at);
+        if self.was_named && self.has_lost_name() {
+            return Err(io::Error::other("its name leads to another file by now, or to none"));
+        }
+        if !self.left.get().is_none_or(is_as_left) {
+            return Err(io::Error::other("others have written to it since it was opened"));
+        }
+        Ok(())
+    }
+
+    /// The content is as it is by what was done here.
+    fn note_as_left(&self) {
+        let found = self.file.metadata().ok().filter(|_| self.has_content());
+        self.left.set(found.and_then(|found| Some((found.len(), found.modified().ok()?))));
     }
 
     /// Gives the room to others again that was reserved behind the content, and the content the time of its last change; of a file
@@ -286,6 +321,7 @@ impl Opened {
             let changed = |now| Reserved { changed: [reserved.changed[0], now], ..reserved };
             self.reserved.set(found.modified().ok().map(changed));
         }
+        self.note_as_left();
     }
 
     /// Another try at noise that could not be cut off, unless others have changed the file since.
@@ -591,9 +627,9 @@ fn is_itself(file: &File, path: &Path) -> bool {
 fn open_or_make(path: &Path) -> io::Result<(File, Option<PathBuf>)> {
     let mut options = OpenOptions::new();
     options.write(true);
-    match output_file::open(path, options.clone().create_new(true)) {
-        Ok(file) => Ok((file, Some(path.into()))),
-        // It is there; or it is a link to a file that is not.
+    let place = end_of_links(path)?;
+    match output_file::open(&place, options.clone().create_new(true)) {
+        Ok(file) => Ok((file, Some(place))),
         Err(error) if error.kind() == io::ErrorKind::AlreadyExists => {
             Ok((output_file::open(path, options.create(true))?, None))
         }
@@ -605,6 +641,55 @@ fn open_or_make(path: &Path) -> io::Result<(File, Option<PathBuf>)> {
 mod tests {
     use super::*;
     use crate::record::whole_lines::WholeLines;
+
+    #[test]
+    fn a_content_that_others_have_renamed_or_changed_is_not_replaced() {
+        type Others = fn(&Path);
+        let cases: [(Others, &str); 3] = [
+            (
+                |path| std::fs::rename(path, path.with_extension("kept")).expect("a name"),
+                "leads to another file",
+            ),
+            (|path| std::fs::write(path, "earlier and more").expect("room"), "others have written"),
+            (
+                |path| {
+                    std::thread::sleep(std::time::Duration::from_millis(20));
+                    std::fs::write(path, "others'").expect("room");
+                },
+                "others have written",
+            ),
+        ];
+        for (others_do, told) in cases {
+            let directory = tempfile::tempdir().expect("a directory");
+            let path = directory.path().join("x.csv");
+            std::fs::write(&path, "earlier").expect("room");
+            let mut opened = Opened::open(&path).expect("a file");
+            opened.reserve(3).expect("room");
+            others_do(&path);
+            let contents = || {
+                let all = std::fs::read_dir(directory.path()).expect("a directory");
+                all.map(|entry| std::fs::read(entry.expect("a file").path()).expect("a file"))
+                    .collect::<Vec<_>>()
+            };
+            let before = contents();
+            let refused = opened.start(3).expect_err("another content");
+            assert!(refused.to_string().contains(told), "{refused}");
+            drop(opened);
+            assert_eq!(contents(), before, "{told}");
+        }
+    }
+
+    #[test]
+    fn what_was_made_for_nothing_through_a_link_is_removed() {
+        let directory = tempfile::tempdir().expect("a directory");
+        let [link, further, target] = ["link", "further", "target"].map(|name| directory.path().join(name));
+        std::os::unix::fs::symlink("further", &link).expect("a link");
+        std::os::unix::fs::symlink(&target, &further).expect("a link");
+        let opened = Opened::open(&link).expect("a file");
+        assert!(target.exists());
+        drop(opened);
+        assert!(!target.exists() && link.is_symlink() && further.is_symlink());
+    }
 
     #[test]
     fn a_file_keeps_its_content_until_it_is_emptied_and_one_that_was_made_for_nothing_is_removed() {
@@ -818,7 +903,7 @@ mod tests {
         let path = directory.path().join("new");
         let first = Opened::open(&path).expect("opened");
         let refused = Opened::recording(&path).expect_err("it is being written");
-        assert!(refused.to_string().contains("another process holds a lock on it"), "{refused}");
+        assert!(refused.to_string().contains("somebody holds a lock on it"), "{refused}");
         assert!(path.exists());
         drop(first);
         assert!(!path.exists(), "made for nothing");

@@ -183,7 +183,11 @@ fn judge(places: &Places, told: Told) -> ExitCode {
     if shown.is_empty() && unseen.is_empty() {
         return nobody_asked(places, &not_asked);
     }
-    let is_one_unheard = !not_asked.is_empty() && tell_of_unheard(&not_asked, &Listeners::find());
+    // Whoever could not be looked for may go on.
+    let is_one_unheard = !not_asked.is_empty() && {
+        let listeners = Listeners::find();
+        tell_of_unheard(&not_asked, &listeners) || listeners.is_cut_short()
+    };
     let silent: Vec<_> = not_asked.iter().filter(|(_, error)| is_silent(error)).collect();
     for (socket, error) in &silent {
         let place = places.told(socket);

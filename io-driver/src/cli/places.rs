@@ -1,11 +1,13 @@
 //! Places of drivers: the socket that somebody named, or the usual ones.
 
-use super::listeners::{Listener, Listeners};
+use super::listeners::{Listener, Listeners, There};
 use super::{EXIT_FAULT, EXIT_USAGE};
 use crate::say::say;
 use clap::Args;
 use shm_abi::client::AttachError;
 use shm_abi::endpoint;
+use shm_abi::users::UserWords;
+use std::collections::BTreeSet;
 use std::fmt;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -70,7 +72,7 @@ pub(super) fn tell_of_unheard(not_asked: &[NotAsked], listeners: &Listeners) -> 
         say(format_args!("io-driver: {error}"));
         let why = match error {
             AttachError::NoDriver { .. } | AttachError::DriverGone { .. } => {
-                ", and its socket's file was moved or deleted"
+                ", and its socket's file was moved or deleted, or is in a container"
             }
             _ => "",
         };
@@ -104,8 +106,12 @@ pub(super) fn nobody_asked(places: &Places, not_asked: &[NotAsked]) -> ExitCode 
     }
     let is_one_silent = not_asked.iter().any(|(_, error)| is_silent(error));
     let mut code = if is_one_silent || listeners.is_cut_short() { EXIT_FAULT } else { EXIT_USAGE };
-    for other in listeners.all.iter().take(MOST_TOLD) {
-        let who = OtherWords(other);
+    // Each once: the first of its sockets is the most certain one.
+    let mut told = BTreeSet::new();
+    let others: Vec<&Listener> = listeners.all.iter().filter(|other| told.insert(other.pid)).collect();
+    for other in others.iter().copied().take(MOST_TOLD) {
+        let is_told_once = listeners.all.iter().filter(|one| one.pid == other.pid).count() == 1;
+        let who = OtherWords { other, is_told_once };
         // Whoever names a driver that is not there has at least heard of those that are.
         if places.is_named {
             say(format_args!("io-driver: {who}, and was not asked"));
@@ -113,7 +119,7 @@ pub(super) fn nobody_asked(places: &Places, not_asked: &[NotAsked]) -> ExitCode 
         }
         code = EXIT_FAULT;
         // Whatever a stranger's process says of itself is not to be asked instead.
-        let socket = if other.is_ours() && other.is_certain {
+        let socket = if other.is_ours() && other.there == There::Itself {
             format!("use --socket {}, ", other.socket.display())
         } else {
             String::new()
@@ -123,7 +129,7 @@ pub(super) fn nobody_asked(places: &Places, not_asked: &[NotAsked]) -> ExitCode 
             ending(other.pid)
         ));
     }
-    let more = listeners.all.len().saturating_sub(MOST_TOLD);
+    let more = others.len().saturating_sub(MOST_TOLD);
     if more > 0 {
         say(format_args!("io-driver: and {more} more that are called like a driver"));
     }
@@ -131,21 +137,25 @@ pub(super) fn nobody_asked(places: &Places, not_asked: &[NotAsked]) -> ExitCode 
 }
 
 /// A driver at another place: what is certain of it, and what is not.
-struct OtherWords<'a>(&'a Listener);
+struct OtherWords<'a> {
+    other: &'a Listener,
+    /// Only one socket is said to be its own: of several, somebody has made the others up.
+    is_told_once: bool,
+}
 
 impl fmt::Display for OtherWords<'_> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Listener { pid, uid, socket, is_certain } = self.0;
-        let socket = socket.display();
-        match (self.0.is_ours(), is_certain) {
-            (true, true) => write!(f, "process {pid} is a driver at {socket}"),
-            (true, false) => {
+        let Listener { pid, owner, socket, there } = self.other;
+        let (socket, user) = (socket.display(), UserWords(owner.user));
+        match (self.other.is_ours(), there) {
+            (true, There::Itself) => write!(f, "process {pid} is a driver at {socket}"),
+            (true, There::Nobody) if self.is_told_once => {
                 write!(f, "process {pid} is called like a driver, by its socket's name at {socket}")
             }
-            (false, _) => write!(
-                f,
-                "process {pid} of user {uid} is called like a driver, and tells of a socket {socket}"
-            ),
+            (true, _) => write!(f, "process {pid} is called like a driver"),
+            (false, _) => {
+                write!(f, "process {pid} of {user} is called like a driver, and tells of a socket {socket}")
+            }
         }
     }
 }

@@ -3,7 +3,7 @@
 //! Problem: the kernel tells it in pieces, and leaves a socket out where another of its bucket is closed between two of them.
 //! Model: it is read again for a process that is not in it, up to [`READINGS`] times, and all that was told counts.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeSet;
 use std::ffi::OsStr;
 use std::os::unix::ffi::OsStrExt;
 use std::path::Path;
@@ -20,11 +20,11 @@ pub(super) enum Whose {
     Named(u32),
 }
 
-/// The listening sockets that a network's table tells of, by their numbers: each once, for a connection that was taken has a
-/// line with the same name and another number.
+/// The listening sockets that a network's table tells of, by their numbers; a connection that was taken has a line with the same
+/// name and another number. One number may be told of with several names: by others, with a name that has an end of a line in it.
 #[derive(Default)]
 pub(super) struct Table {
-    sockets: BTreeMap<u64, Vec<u8>>,
+    sockets: BTreeSet<(u64, Vec<u8>)>,
     readings: usize,
 }
 
@@ -48,7 +48,7 @@ impl Table {
             self.readings += 1;
             self.sockets.extend(text.split(|byte| *byte == b'\n').filter_map(socket_of));
         }
-        let its = self.sockets.iter().filter(move |(number, name)| is_its(**number, name));
+        let its = self.sockets.iter().filter(move |(number, name)| is_its(*number, name));
         its.map(|(_, name)| Path::new(OsStr::from_bytes(without_number(name))))
     }
 }

@@ -44,7 +44,8 @@ pub(super) fn stop(places: &Places) -> ExitCode {
                 let listeners = if others { Listeners::find() } else { Listeners::default() };
                 let is_one_unheard = tell_of_unheard(&not_asked, &listeners);
                 tell_of_others(places, socket, &not_asked, &listeners);
-                return if is_one_unheard { ExitCode::from(EXIT_FAULT) } else { code };
+                let may_go_on = is_one_unheard || listeners.is_cut_short();
+                return if may_go_on { ExitCode::from(EXIT_FAULT) } else { code };
             }
         }
     }

@@ -6,8 +6,8 @@
 //! memory from being sealed, or hands a second offer back within [`REMEMBERED`], has lapsed: for that time his offers give
 //! way at once, to whoever has not lapsed. It is his own loss: without others he commands as before. Administrators take
 //! every offer of others, give theirs to none but each other, and do not lapse. A user whose lease they ended waits for that
-//! time: else he who asks at once has it again before anybody else. More users than [`MOST`] at once are not remembered, the
-//! oldest first.
+//! time: else he who asks at once has it again before anybody else. More users than [`MOST`] of each kind at once are not
+//! remembered, the oldest first.
 //! Limit: users that cannot be told apart lapse together, and are told from each other only by time.
 
 use std::time::{Duration, Instant};
@@ -27,11 +27,11 @@ pub(super) struct Rival {
     pub(super) is_administrator: bool,
 }
 
-/// Users who let offers lapse or handed them back, the oldest first; and the last whose lease an administrator ended.
+/// Users who let offers lapse or handed them back, and users whose leases administrators ended, the oldest first.
 #[derive(Debug, Default)]
 pub(super) struct Lapsed {
     entries: Vec<Entry>,
-    ended: Option<Entry>,
+    ended: Vec<Entry>,
 }
 
 #[derive(Debug)]
@@ -56,13 +56,13 @@ impl Lapsed {
 
     /// An administrator has ended this one's lease.
     pub(super) fn note_ended(&mut self, rival: Rival) {
-        self.ended = Some(Entry { user: rival.user, at: Instant::now(), has_lapsed: false });
+        put(&mut self.ended, rival.user, false);
     }
 
     /// True of one whose lease an administrator ended shortly before.
     pub(super) fn must_wait(&self, rival: Rival) -> bool {
         let is_it = |ended: &Entry| ended.user == rival.user && ended.counts();
-        !rival.is_administrator && self.ended.as_ref().is_some_and(is_it)
+        !rival.is_administrator && self.ended.iter().any(is_it)
     }
 
     /// True if an offer to this user lapsed shortly before.
@@ -85,12 +85,16 @@ impl Lapsed {
         if rival.is_administrator {
             return;
         }
-        self.entries.retain(|entry| entry.user != rival.user && entry.counts());
-        if self.entries.len() == MOST {
-            self.entries.remove(0);
-        }
-        self.entries.push(Entry { user: rival.user, at: Instant::now(), has_lapsed });
+        put(&mut self.entries, rival.user, has_lapsed);
     }
+}
+
+fn put(entries: &mut Vec<Entry>, user: Option<u32>, has_lapsed: bool) {
+    entries.retain(|entry| entry.user != user && entry.counts());
+    if entries.len() == MOST {
+        entries.remove(0);
+    }
+    entries.push(Entry { user, at: Instant::now(), has_lapsed });
 }
 
 impl Entry {
@@ -162,8 +166,11 @@ mod tests {
         );
         let long_ago =
             Instant::now().checked_sub(REMEMBERED + Duration::from_secs(1)).expect("it has been up for long");
-        lapsed.ended.as_mut().expect("noted").at = long_ago;
-        assert!(!lapsed.must_wait(one));
+        // Nor do two who take turns have it.
+        lapsed.note_ended(other);
+        assert_eq!([one, other].map(|rival| lapsed.must_wait(rival)), [true; 2]);
+        lapsed.ended[0].at = long_ago;
+        assert_eq!([one, other].map(|rival| lapsed.must_wait(rival)), [false, true]);
     }
 
     #[test]

@@ -84,6 +84,12 @@ fn a_driver_is_stopped_through_a_link_to_its_socket() {
     assert_eq!(stop_socket::send(&link).unwrap(), Sent::Queued);
     assert!(told.recv_timeout(limit()).is_ok());
     std::fs::remove_file(path_beside(&link)).unwrap();
+    // Nor is a stranger who listens there.
+    let stranger = UnixDatagram::bind(path_beside(&link)).unwrap();
+    assert_eq!(stop_socket::send(&link).unwrap(), Sent::Queued);
+    assert!(told.recv_timeout(limit()).is_ok());
+    drop(stranger);
+    std::fs::remove_file(path_beside(&link)).unwrap();
     std::fs::remove_file(&link).unwrap();
     std::os::unix::fs::symlink(directory.path().join("nobody.sock"), &link).unwrap();
     assert_eq!(stop_socket::send(&link).unwrap_err().kind(), std::io::ErrorKind::NotFound);

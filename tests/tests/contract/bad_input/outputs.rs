@@ -401,7 +401,7 @@ fn the_recording_of_a_later_scene_that_cannot_be_made_is_the_one_that_is_told() 
     let run = ["run", "scene.toml", "--clock", "virtual", "--seconds", "0.3", "--orders", "orders.txt"];
     let said = place.run([&run[..], &["--record", "out.csv", "--record", "other.csv"]].concat());
     assert_eq!(said.status, Some(3), "{}", said.err);
-    assert_says(&said.err, &["out.2.csv: another process holds a lock on it"]);
+    assert_says(&said.err, &["out.2.csv: somebody holds a lock on it"]);
     assert_says(&said.out, &["out.2.csv (0 rows) NOT COMPLETE"]);
     for name in ["out.csv", "other.csv", "other.2.csv"] {
         let line = said.out.lines().find(|line| line.contains(&format!(" {name} (")));
