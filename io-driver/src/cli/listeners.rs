@@ -17,12 +17,14 @@ use std::cell::Cell;
 use std::collections::{BTreeSet, HashMap};
 use std::fs::File;
 use std::io::Read;
+use std::os::fd::AsFd;
 use std::os::unix::ffi::OsStrExt;
 use std::os::unix::fs::MetadataExt;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
-use rustix::net::{AddressFamily, SocketAddrUnix, SocketFlags, SocketType, connect, socket_with, sockopt};
+use rustix::net::{AddressFamily, SocketAddrUnix, SocketFlags, SocketType, connect, socket_with};
+use shm_abi::peer::Peer;
 use shm_abi::socket_file::whole_path;
 use shm_abi::users::known_user;
 
@@ -198,8 +200,8 @@ fn process_at(path: &Path) -> Option<u32> {
     let flags = SocketFlags::CLOEXEC | SocketFlags::NONBLOCK;
     let asking = socket_with(AddressFamily::UNIX, SocketType::STREAM, flags, None).ok()?;
     connect(&asking, &address).ok()?;
-    let listener = sockopt::socket_peercred(&asking).ok()?;
-    Some(listener.pid.as_raw_nonzero().get().cast_unsigned())
+    // None that is visible here has the number 0, which no process of ours has.
+    Peer::of(asking.as_fd()).ok().map(|listener| listener.pid)
 }
 
 /// The text of a table, or its whole lines as far as there was time.
