@@ -15,8 +15,9 @@
 //! Limits: six places a pair. Crossings are found of a box's edges, of the lines along which cylinders, cones and capsules
 //! touch, and of sharp edges that leave the vertices of a mesh that were chosen: of fine meshes these are short, but vertices
 //! lie as near. Rims of round forms are not cut off. An ellipsoid touches with one point: a flat one that tumbles comes down on its
-//! other end at once, and of twenty that were thrown at 6 m/s two came through a plate of 2 mm (of 5 mm none). A sheet has no inside: what is far behind it is taken for what has always
-//! been there, and limbs that are thin beside the way of a tick are lost now and then (`tests/all/meshes_sheets.rs` counts them).
+//! other end at once, and of twenty that were thrown at 6 m/s two came through a plate of 2 mm (of 5 mm none). A sheet has no
+//! inside: what is far behind it is taken for what has always been there, and limbs that are thin beside the way of a tick are
+//! lost now and then (`tests/all/meshes_sheets.rs` counts them).
 //! Cost: for each place two choices of vertices and at most eight queries for the nearest point for each side; and a search
 //! when the two have moved by a millimetre; bounded.
 
