@@ -116,7 +116,9 @@ impl Mesh {
                 let is_moved = face.vertices.iter().any(|vertex| moves[*vertex as usize] != Vector3::zeros());
                 let corners =
                     || face.vertices.map(|vertex| self.vertices[vertex as usize] + moves[vertex as usize]);
-                if is_moved && !(plane_of(&corners()).0.dot(&face.normal_B) > TURNED) {
+                // No number, if it would have no area.
+                let looks_on = || plane_of(&corners()).0.dot(&face.normal_B) > TURNED;
+                if is_moved && !looks_on() {
                     face.vertices.iter().for_each(|vertex| moves[*vertex as usize] = Vector3::zeros());
                     is_done = false;
                 }

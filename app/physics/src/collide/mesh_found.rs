@@ -84,7 +84,7 @@ impl Found {
             (at >= begin || one.normal_M.dot(&contact.normal_M) > AGREES)
                 && (one.on_mesh_M - contact.on_mesh_M).norm_squared() < together_m * together_m
         };
-        let there = self.contacts[..self.count].iter().enumerate().position(|one| is_there(one));
+        let there = self.contacts[..self.count].iter().enumerate().position(is_there);
         contact.carried = self.carried.contains(&contact.id);
         contact.id |= (self.patch as u32) << PATCH_SHIFT;
         if let Some(there) = there {
