@@ -300,6 +300,29 @@ fn nothing_slips_through_in_steps() {
     }
 }
 
+/// A start that rounding has put beside the rim of the face that is entered, behind the one next to it.
+#[test]
+fn nothing_slips_in_beside_the_rim_of_a_concave_edge() {
+    let outline = [[0.0, 0.0], [2.0, 0.0], [2.0, 1.0], [1.0, 1.0], [1.0, 2.0], [0.0, 2.0]];
+    let mut noise = Noise(23);
+    for case in 0..3000 {
+        let turn = Rotation3::new(noise.vector(2.0));
+        let end = |z: f64| outline.iter().map(move |[x, y]| turn * Vector3::new(*x, *y, z));
+        let vertices = end(1.0).chain(end(-1.0)).collect();
+        let front = [[0, 1, 3], [1, 2, 3], [0, 3, 5], [3, 4, 5]];
+        let mut faces = front.to_vec();
+        faces.extend(front.map(|[a, b, c]| [a + 6, c + 6, b + 6]));
+        (0..6).for_each(|a| faces.extend([[a, a + 6, (a + 1) % 6 + 6], [a, (a + 1) % 6 + 6, (a + 1) % 6]]));
+        let mesh = mesh(TriangleSoup { vertices, faces });
+        // Along one side, away from it or into it by little, and into the other one.
+        let little = noise.between(-1.0, 1.0) * 1e-6;
+        let way = if case % 2 == 0 { [-0.1, little] } else { [little, -0.1] };
+        let from = turn * (Vector3::new(1.0, 1.0, noise.between(-0.5, 0.5)) + noise.vector(2e-14));
+        let to = from + turn * Vector3::new(way[0], way[1], noise.between(-0.1, 0.1));
+        assert!(mesh.first_hit(&from, &to).is_some(), "{case}: {from:?} {to:?}");
+    }
+}
+
 #[test]
 fn a_segment_that_ends_on_a_face_up_to_rounding_has_met_it() {
     for (name, mesh) in small_meshes() {
