@@ -14,10 +14,10 @@ use rt_core::plain_text::{PlainJson, PlainLines};
 use rt_core::{limits, replacement};
 use serde_json::{Value, json};
 use std::collections::BTreeMap;
-use std::fmt::Write;
+use std::fmt::{self, Write};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
-use world::model::{self, FaceNames, ModelError};
+use world::model::{self, FaceNames, Format, ModelError};
 
 /// Runs the command: status 0 if the model can be felt, 2 if it cannot, or the options do not fit, 3 if it can and is not
 /// written.
@@ -86,6 +86,8 @@ struct Understood {
     /// Area of its surface and volume of the space in it.
     area: f64,
     volume: f64,
+    /// Its format says so.
+    is_in_metres: bool,
 }
 
 fn understand(args: &CheckArgs) -> Result<Understood, NotUnderstood> {
@@ -110,6 +112,7 @@ fn read(args: &CheckArgs) -> Result<Understood, String> {
     let soup = model::read(&args.scene, &bytes).map_err(told)?;
     let names = model::read_names(&args.scene, &bytes).map_err(told)?;
     let looks = model::read_appearance(&args.scene, &bytes);
+    let is_in_metres = Format::of(&args.scene, &bytes) == Some(Format::Gltf);
     let unread = looks.map_or_else(|error| vec![error.to_string()], |looks| looks.unwrap_or_default().unread);
     drop(bytes);
     let holes = args.close_holes.map_or(CloseHoles::Small, CloseHoles::UpTo);
@@ -129,7 +132,7 @@ fn read(args: &CheckArgs) -> Result<Understood, String> {
         area += 0.5 * (b - a).cross(&(c - a)).norm();
         volume += a.dot(&b.cross(&c)) / 6.0;
     }
-    Ok(Understood { mesh, report, is_lid, origins, names, unread, low, high, area, volume })
+    Ok(Understood { mesh, report, is_lid, origins, names, unread, low, high, area, volume, is_in_metres })
 }
 
 impl Understood {
@@ -157,13 +160,19 @@ impl Understood {
         row("felt", &self.felt());
         let size = self.high - self.low;
         let [low, high] = [self.low, self.high].map(|v| v.map(|x| rounded(x, size.amax())));
-        let size = size.map(|x| short(without_noise(x, size.amax())));
-        row("size", &format!("{} x {} x {}, from {} to {}", size.x, size.y, size.z, list(&low), list(&high)));
-        row("surface", &format!("{} square", short(self.area)));
+        let [x, y, z] = <[f64; 3]>::from(size).map(|x| Figure(short(without_noise(x, size.amax()))));
+        row("size", &format!("{x} x {y} x {z}, from {} to {}", list(&low), list(&high)));
+        row("surface", &format!("{} square", Figure(short(self.area))));
         if self.mesh.sides() == Sides::Solid {
-            row("volume", &format!("{} cubic", short(self.volume)));
+            row("volume", &format!("{} cubic", Figure(short(self.volume))));
         }
-        row("unit", "the file's own; a scene takes it for metres, times the mesh's `scale`");
+        row(
+            "unit",
+            match self.is_in_metres {
+                true => "metres, as glTF has it, times the mesh's `scale` in a scene",
+                false => "the file's own; a scene takes it for metres, times the mesh's `scale`",
+            },
+        );
         if let Some(names) = self.names() {
             row("names", &names);
         }
@@ -223,21 +232,21 @@ impl Understood {
 
     fn warnings(&self) -> impl Iterator<Item = String> {
         let unread = self.unread.iter().map(|said| format!("{said}; it is for the window only"));
-        self.suspicion().into_iter().chain(unread)
+        suspicion((self.high - self.low).amax()).into_iter().chain(unread)
     }
+}
 
-    fn suspicion(&self) -> Option<String> {
-        let size = (self.high - self.low).amax();
-        let (unit, scale) = match size {
-            size if size > 3000.0 => ("micrometres or inches of a large thing", 1e-6),
-            size if size > 3.0 => ("millimetres", 1e-3),
-            _ => return None,
-        };
-        Some(format!(
-            "{} m is larger than what a hand reaches: numbers in {unit}? Then `scale = {scale:?}`",
-            short(size)
-        ))
-    }
+/// Words about a size that is no thing's for a hand.
+fn suspicion(size: f64) -> Option<String> {
+    let (what, unit, scale) = match size {
+        size if size > 3000.0 => {
+            ("larger than what a hand reaches", "numbers in micrometres or inches of a large thing", 1e-6)
+        }
+        size if size > 3.0 => ("larger than what a hand reaches", "numbers in millimetres", 1e-3),
+        size if size < 1e-4 => ("finer than a hair", "made smaller twice", 1e3),
+        _ => return None,
+    };
+    Some(format!("{} m is {what}: {unit}? Then `scale = {scale:?}`", Figure(short(size))))
 }
 
 fn to_json(
@@ -301,12 +310,39 @@ fn without_noise(number: f64, size: f64) -> f64 {
 }
 
 fn list(v: &Vector3<f64>) -> String {
-    format!("[{}, {}, {}]", v.x, v.y, v.z)
+    format!("[{}, {}, {}]", Figure(v.x), Figure(v.y), Figure(v.z))
+}
+
+/// A number in words: with an exponent where it would be a row of zeros.
+struct Figure(f64);
+
+impl fmt::Display for Figure {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self(number) = self;
+        if *number == 0.0 || (1e-6..1e9).contains(&number.abs()) {
+            write!(f, "{number}")
+        } else {
+            write!(f, "{number:e}")
+        }
+    }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn sizes_that_are_no_things_for_a_hand_are_told_and_numbers_are_short() {
+        let words = |size| suspicion(size).unwrap_or_default();
+        assert_eq!(
+            words(50.0),
+            "50 m is larger than what a hand reaches: numbers in millimetres? Then `scale = 0.001`"
+        );
+        assert_eq!(words(5e-5), "0.00005 m is finer than a hair: made smaller twice? Then `scale = 1000.0`");
+        assert!(words(5e4).contains("`scale = 1e-6`") && words(0.1).is_empty() && words(3e-4).is_empty());
+        let figures = [0.0, 1e-40, -2.5e-7, 0.05, 123_456.0, 3e12].map(|number| Figure(number).to_string());
+        assert_eq!(figures, ["0", "1e-40", "-2.5e-7", "0.05", "123456", "3e12"]);
+    }
 
     #[test]
     fn bounds_are_rounded_to_the_size_of_the_thing_however_far_away_it_is() {

@@ -625,13 +625,20 @@ fn is_itself(file: &File, path: &Path) -> bool {
 
 /// The file, and its name if it was not there.
 fn open_or_make(path: &Path) -> io::Result<(File, Option<PathBuf>)> {
-    let mut options = OpenOptions::new();
-    options.write(true);
-    let place = end_of_links(path)?;
-    match output_file::open(&place, options.clone().create_new(true)) {
-        Ok(file) => Ok((file, Some(place))),
-        Err(error) if error.kind() == io::ErrorKind::AlreadyExists => {
-            Ok((output_file::open(path, options.create(true))?, None))
+    let make = |place: &Path| output_file::open(place, OpenOptions::new().write(true).create_new(true));
+    let is_there = |error: &io::Error| error.kind() == io::ErrorKind::AlreadyExists;
+    let made = match make(path) {
+        // A link to a file that is not there.
+        Err(error) if is_there(&error) && !path.exists() => {
+            let place = end_of_links(path)?;
+            make(&place).map(|file| (file, place))
+        }
+        made => made.map(|file| (file, path.into())),
+    };
+    match made {
+        Ok((file, place)) => Ok((file, Some(place))),
+        Err(error) if is_there(&error) => {
+            Ok((output_file::open(path, OpenOptions::new().write(true).create(true))?, None))
         }
         Err(error) => Err(error),
     }

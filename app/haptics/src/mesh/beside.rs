@@ -25,14 +25,14 @@ pub(super) fn widest_m(extent_m: f64) -> f64 {
 }
 
 impl Mesh {
-    /// Marks the faces beside other parts, and says how many there are, and which pairs lie along each other.
-    pub(super) fn mark_beside(&mut self, parts: &Parts) -> (NarrowGaps, Vec<[u32; 2]>) {
+    /// Marks the faces beside other parts, and says how many there are, and which of them are walls that fit.
+    pub(super) fn mark_beside(&mut self, parts: &Parts) -> (NarrowGaps, Vec<bool>) {
         let widest_m = widest_m(self.extent_m);
         let mut gaps = NarrowGaps { widest_m, ..NarrowGaps::default() };
         if parts.len() < 2 || !self.has_inside {
             return (gaps, Vec::new());
         }
-        let mut along = Vec::new();
+        let (sizes, mut is_fitting) = (self.sizes(parts), vec![false; self.faces.len()]);
         let (mut is_beside, mut is_told) = (vec![false; self.faces.len()], vec![false; self.faces.len()]);
         let mut left = MOST_PAIRS.saturating_mul(self.faces.len());
         self.bvh.for_each_pair(widest_m, |i, j| {
@@ -46,8 +46,8 @@ impl Mesh {
                 let lies_along = pair[0].normal_B.dot(&pair[1].normal_B).abs() > ALONG;
                 is_told[i as usize] |= lies_along;
                 is_told[j as usize] |= lies_along;
-                if lies_along {
-                    along.push([i, j]);
+                if lies_along && let Some(face) = self.fitting([i, j], parts, &sizes) {
+                    is_fitting[face as usize] = true;
                 }
             }
             left -= 1;
@@ -63,7 +63,7 @@ impl Mesh {
         for face in self.faces.iter_mut().filter(|face| face.sides == Sides::Solid) {
             face.is_beside = face.vertices.iter().any(|vertex| vertices.contains(vertex));
         }
-        (gaps, along)
+        (gaps, is_fitting)
     }
 }
 

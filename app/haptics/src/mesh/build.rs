@@ -107,9 +107,9 @@ impl Mesh {
             Self { faces, vertices, bvh, sides, has_inside, extent_m, identity, uv: None, labels: None };
         report.crossed = mesh.mark_crossed();
         mesh.turn_outward(&parts, &mut report);
-        let fitting;
-        (report.narrow_gaps, fitting) = mesh.mark_beside(&parts);
-        mesh.fit(&parts, &fitting, &mut report.narrow_gaps);
+        let is_fitting;
+        (report.narrow_gaps, is_fitting) = mesh.mark_beside(&parts);
+        mesh.fit(&is_fitting, &mut report.narrow_gaps);
         if report.narrow_gaps.moved > 0 {
             mesh.mark_crossed();
         }

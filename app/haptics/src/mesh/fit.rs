@@ -13,7 +13,7 @@
 //! Frames: object frame B.
 //! Limit: what is moved is felt, too, where it is not hidden: a bore is narrower by twice 12 um if its ring is smaller than the
 //! pin. Faces smaller than a few cracks stay, and the cracks beside them.
-//! Cost: linear in the faces and in the pairs that fit; nothing where none do.
+//! Cost: linear in the faces; nothing where none fit.
 
 use nalgebra::{Matrix3, Vector3};
 
@@ -24,22 +24,20 @@ use super::winding::Parts;
 use super::{Bvh, Mesh};
 
 impl Mesh {
-    /// Moves the walls of these pairs of faces, which are of different parts and nearer than a crack.
-    pub(super) fn fit(&mut self, parts: &Parts, pairs: &[[u32; 2]], gaps: &mut NarrowGaps) {
-        if pairs.is_empty() {
+    /// Of two faces of different parts that are nearer than a crack, the one that is to be moved, if they fit.
+    pub(super) fn fitting(&self, pair: [u32; 2], parts: &Parts, sizes: &[f64]) -> Option<u32> {
+        let [a, b] = pair.map(|face| sizes[parts.of(face as usize)]);
+        let [normal_B, other_B] = pair.map(|face| self.faces[face as usize].normal_B);
+        let do_fit = normal_B.dot(&other_B) < -PARALLEL && !self.do_overlap(pair);
+        do_fit.then_some(if b < a { pair[1] } else { pair[0] })
+    }
+
+    /// Moves the walls that fit.
+    pub(super) fn fit(&mut self, is_fitting: &[bool], gaps: &mut NarrowGaps) {
+        if !is_fitting.contains(&true) {
             return;
         }
-        let sizes = self.sizes(parts);
-        let mut is_fitting = vec![false; self.faces.len()];
-        for pair in pairs {
-            let [a, b] = pair.map(|face| parts.of(face as usize));
-            let smaller = if sizes[b] < sizes[a] { pair[1] } else { pair[0] };
-            let normals = pair.map(|face| self.faces[face as usize].normal_B);
-            if normals[0].dot(&normals[1]) < -PARALLEL && !self.do_overlap(pair) {
-                is_fitting[smaller as usize] = true;
-            }
-        }
-        let by_B = self.moves(&is_fitting);
+        let by_B = self.moves(is_fitting);
         gaps.moved = by_B.iter().filter(|by_B| **by_B != Vector3::zeros()).count();
         gaps.moved_by_m = FIT * gaps.widest_m;
         if gaps.moved == 0 {
@@ -58,7 +56,7 @@ impl Mesh {
     }
 
     /// Diagonals of the parts' boxes \[m\].
-    fn sizes(&self, parts: &Parts) -> Vec<f64> {
+    pub(super) fn sizes(&self, parts: &Parts) -> Vec<f64> {
         let mut boxes =
             vec![[Vector3::repeat(f64::INFINITY), Vector3::repeat(f64::NEG_INFINITY)]; parts.len()];
         for (i, face) in self.faces.iter().enumerate() {
@@ -72,7 +70,7 @@ impl Mesh {
     }
 
     /// Walls that are as far in each other as they would be moved at least.
-    fn do_overlap(&self, pair: &[u32; 2]) -> bool {
+    fn do_overlap(&self, pair: [u32; 2]) -> bool {
         let least_m = (FIT - 1.0) * 0.5 * widest_m(self.extent_m);
         let [one, other] = pair.map(|face| &self.faces[face as usize]);
         let is_behind =

@@ -140,7 +140,7 @@ fn walls_that_fit_are_moved_by_little_and_once() {
                 .unwrap();
             let by_m = (nearest - vertex).norm();
             // Off two faces, which are at right angles to each other at most, and nothing along the pin.
-            assert!(by_m < 1.001 * gaps.moved_by_m * 2_f64.sqrt(), "{case}: {by_m:e}");
+            assert!(by_m <= 1.001 * gaps.moved_by_m * 2_f64.sqrt(), "{case}: {by_m:e}");
             let along_m = (assembly.turn.inverse() * (nearest - vertex)).z;
             assert!(along_m.abs() < 1e-11, "{case}: {along_m:e}");
             moved += usize::from(by_m > 1e-9);

@@ -4,9 +4,10 @@
 //! put there by its node and those above, as one soup (of a file in which no node shows a mesh, all meshes as they are: a
 //! library of them); triangles, strips and fans, with and without indices; sparse
 //! accessors; positions as floats or quantised (`KHR_mesh_quantization`); names; for whoever draws it, base colours and their
-//! textures (`materials`). Metres, y up, as in a scene of ours. Passed over: cameras, lights, animations, skins and morph
-//! targets (the shape is that at rest), points and lines.
-//! Refused: compressed geometry (Draco, meshopt), and glTF 1.0.
+//! textures (`materials`). Metres, y up, as in a scene of ours. Morph targets and skins count as they are at rest
+//! ([`deformed`]). Passed over: cameras, lights, animations, points and lines.
+//! Refused: compressed geometry (Draco, meshopt), other extensions that the file requires and a shape may depend on, and glTF
+//! 1.0.
 //!
 //! Nothing is believed: every index, range and step is checked against what is there. A node may be reached in one way only, as
 //! the format has it, which bounds the walk. A small file can name the same megabyte a thousand times, or count
@@ -17,6 +18,7 @@
 
 mod accessor;
 mod buffers;
+mod deformed;
 mod document;
 mod materials;
 
@@ -25,7 +27,8 @@ use super::ply::Strip;
 use super::{FaceNames, ModelError};
 use accessor::Accessors;
 use buffers::Buffers;
-use document::{Document, Name, Node, Primitive};
+use deformed::Skin;
+use document::{Document, Node, Primitive};
 use haptics::mesh::{CornerUv, TriangleSoup};
 use materials::Materials;
 use nalgebra::{Matrix3, Matrix4, Quaternion, UnitQuaternion, Vector3};
@@ -99,6 +102,14 @@ pub(super) fn looks_like_gltf(bytes: &[u8]) -> bool {
 
 const LOOKED_AT_BYTES: usize = 1 << 16;
 
+/// What puts a mesh into the scene.
+enum Put {
+    /// Its node.
+    By(Matrix4<f64>),
+    /// The joints that it hangs on.
+    ByJoints(Skin),
+}
+
 /// The meshes of all nodes, put together.
 struct Merged<'d> {
     document: &'d Document,
@@ -147,20 +158,30 @@ impl<'d> Merged<'d> {
         for root in self.document.roots()?.into_iter().rev() {
             open.push(reach(root, Matrix4::identity())?);
         }
+        let (mut shown, mut all_X_WN) = (Vec::new(), vec![None; nodes.len()]);
         while let Some((index, X_WP)) = open.pop() {
-            let place = format!("nodes[{index}]");
             let node = &nodes[index];
-            let X_WN = X_WP * transform(&place, node)?;
+            let X_WN = X_WP * transform(&format!("nodes[{index}]"), node)?;
+            all_X_WN[index] = Some(X_WN);
             if let Some(mesh) = node.mesh {
-                self.add_mesh(mesh, &X_WN, (&place, &node.name))?;
+                shown.push((index, mesh, X_WN));
             }
             for &child in node.children.iter().rev() {
                 open.push(reach(child, X_WN)?);
             }
         }
+        // Joints may come after what hangs on them.
+        for (index, mesh, X_WN) in shown {
+            let (place, node) = (format!("nodes[{index}]"), &nodes[index]);
+            let skin =
+                node.skin.map(|skin| Skin::read(self.document, &mut self.accessors, skin, &all_X_WN, &place));
+            let put = skin.transpose()?.map_or(Put::By(X_WN), Put::ByJoints);
+            self.add_mesh(mesh, &put, (&place, node))?;
+        }
         if nodes.iter().all(|node| node.mesh.is_none()) {
             for mesh in 0..self.document.meshes.len() {
-                self.add_mesh(mesh, &Matrix4::identity(), (&format!("meshes[{mesh}]"), &Name::default()))?;
+                let put = Put::By(Matrix4::identity());
+                self.add_mesh(mesh, &put, (&format!("meshes[{mesh}]"), &Node::default()))?;
             }
         }
         Ok(())
@@ -169,18 +190,20 @@ impl<'d> Merged<'d> {
     fn add_mesh(
         &mut self,
         index: usize,
-        X_WN: &Matrix4<f64>,
-        (node, name): (&str, &Name),
+        put: &Put,
+        (node_place, node): (&str, &Node),
     ) -> Result<(), ModelError> {
         let meshes = &self.document.meshes;
-        let mesh =
-            meshes.get(index).ok_or_else(|| missing(&format!("{node}.mesh = {index}"), meshes.len()))?;
+        let mesh = meshes
+            .get(index)
+            .ok_or_else(|| missing(&format!("{node_place}.mesh = {index}"), meshes.len()))?;
+        let weights = node.weights.as_ref().unwrap_or(&mesh.weights);
         for (number, primitive) in mesh.primitives.iter().enumerate() {
             let place = format!("meshes[{index}].primitives[{number}]");
             let before = self.soup.faces.len();
-            self.add_primitive(primitive, X_WN, &place, node)?;
+            self.add_primitive(primitive, (put, weights), &place, node_place)?;
             let material = primitive.material.and_then(|index| self.document.materials.get(index));
-            let all = [Some(name), Some(&mesh.name), material.map(|material| &material.name)];
+            let all = [Some(&node.name), Some(&mesh.name), material.map(|material| &material.name)];
             let set = self.names.set(all.into_iter().flatten().filter_map(|name| name.0.as_deref()));
             self.names.add(set, self.soup.faces.len() - before);
         }
@@ -190,7 +213,7 @@ impl<'d> Merged<'d> {
     fn add_primitive(
         &mut self,
         primitive: &Primitive,
-        X_WN: &Matrix4<f64>,
+        (put, weights): (&Put, &[f64]),
         place: &str,
         node: &str,
     ) -> Result<(), ModelError> {
@@ -200,13 +223,21 @@ impl<'d> Merged<'d> {
         if mode < TRIANGLES {
             return Ok(());
         }
-        let positions = self.accessors.positions(positions, place)?;
+        let mut positions = self.accessors.positions(positions, place)?;
+        deformed::morph(&mut self.accessors, primitive, weights, &mut positions, place)?;
+        let is_turned = match put {
+            Put::By(X_WN) => {
+                positions.iter_mut().for_each(|p| *p = X_WN.transform_point(&(*p).into()).coords);
+                linear(X_WN).determinant() < 0.0
+            }
+            Put::ByJoints(skin) => skin.place(&mut self.accessors, primitive, &mut positions, place)?,
+        };
         let corners = match primitive.indices {
             Some(indices) => self.accessors.indices(indices, positions.len(), place)?,
             None => (0..positions.len() as u32).collect(),
         };
         let mut faces = triangles(mode, &corners, place)?;
-        if linear(X_WN).determinant() < 0.0 {
+        if is_turned {
             faces.iter_mut().for_each(|face| face.swap(1, 2));
         }
         self.dress(primitive, &faces, place);
@@ -216,7 +247,7 @@ impl<'d> Merged<'d> {
             let own = &mut places[*corner as usize];
             if *own == u32::MAX {
                 *own = self.soup.vertices.len() as u32;
-                let vertex = X_WN.transform_point(&positions[*corner as usize].into()).coords;
+                let vertex = positions[*corner as usize];
                 if !vertex.iter().all(|x| x.is_finite()) {
                     let found = format!("vertex {corner} of {place} beyond all numbers");
                     return Err(wrong(node.into(), found, "a transform that leaves finite coordinates"));

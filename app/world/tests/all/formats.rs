@@ -468,6 +468,109 @@ fn triangles_strips_and_fans_of_gltf_are_read_and_points_and_lines_are_not() {
     assert_eq!(corners(&plain.soup()), square, "without indices");
 }
 
+/// Each position times this, and moved.
+fn placed(factor: f64, by: [f64; 3]) -> Vec<[f32; 3]> {
+    let mut soup = square();
+    soup.vertices.iter_mut().for_each(|vertex| *vertex = *vertex * factor + Vector3::from(by));
+    corners(&soup)
+}
+
+#[test]
+fn morph_targets_of_gltf_are_added_by_the_weights_of_the_node_or_else_of_the_mesh() {
+    let mut document = Document::square();
+    document.primitives = document
+        .primitives
+        .replace("\"indices\"", "\"targets\":[{\"NORMAL\":0},{\"POSITION\":0}],\"indices\"");
+    assert_eq!(corners(&document.soup()), placed(1.0, [0.0; 3]), "no weights");
+    let of_mesh = document.changed("[{\"primitives\"", "[{\"weights\":[1,1],\"primitives\"");
+    assert_eq!(corners(&of_mesh.expect("a square")), placed(2.0, [0.0; 3]));
+    document.nodes = "{\"mesh\":0,\"weights\":[1,0.5],\"translation\":[5,0,0]}".into();
+    let of_node = document.changed("[{\"primitives\"", "[{\"weights\":[1,1],\"primitives\"");
+    assert_eq!(corners(&of_node.expect("a square")), placed(1.5, [5.0, 0.0, 0.0]));
+    document.accessors += ",{\"bufferView\":0,\"componentType\":5126,\"count\":3,\"type\":\"VEC3\"}";
+    document.primitives = document.primitives.replace("{\"POSITION\":0}]", "{\"POSITION\":2}]");
+    refused(
+        document.read(),
+        "meshes[0].primitives[0].targets[1]: found 3 elements; allowed: one for each of its 4 positions",
+    );
+}
+
+/// Two joints, one of them moved by 7 and turned inside out, the other one by 1; both were bound where they were half as large.
+fn skinned(weights: [u8; 4]) -> Document {
+    let mut document = Document::square();
+    document.more =
+        "\"scenes\":[{\"nodes\":[0,1,2]}],\"skins\":[{\"joints\":[1,2],\"inverseBindMatrices\":4}]".into();
+    document.nodes = "{\"mesh\":0,\"skin\":0,\"translation\":[5,0,0]},\
+                      {\"translation\":[0,0,7],\"scale\":[1,1,-1]},{\"translation\":[0,0,1]}"
+        .into();
+    document.primitives =
+        document.primitives.replace("\"POSITION\":0", "\"POSITION\":0,\"JOINTS_0\":2,\"WEIGHTS_0\":3");
+    document.accessors += ",{\"bufferView\":2,\"componentType\":5121,\"count\":4,\"type\":\"VEC4\"},\
+        {\"bufferView\":2,\"byteOffset\":16,\"componentType\":5121,\"normalized\":true,\"count\":4,\"type\":\"VEC4\"},\
+        {\"bufferView\":3,\"componentType\":5126,\"count\":2,\"type\":\"MAT4\"}";
+    document.views += ",{\"buffer\":0,\"byteOffset\":54,\"byteLength\":32},{\"buffer\":0,\"byteOffset\":86,\"byteLength\":128}";
+    (0..4).for_each(|_| document.buffer.extend([0, 1, 0, 0]));
+    (0..4).for_each(|_| document.buffer.extend(weights));
+    let bound = nalgebra::Matrix4::<f32>::new_scaling(2.0);
+    (0..2).for_each(|_| document.buffer.extend(bound.as_slice().iter().flat_map(|x| x.to_le_bytes())));
+    document
+}
+
+#[test]
+fn skins_of_gltf_put_vertices_where_their_joints_are_and_not_their_node() {
+    let other = corners(&skinned([0, 255, 0, 0]).soup());
+    assert_eq!(other, placed(2.0, [0.0, 0.0, 1.0]));
+    // The mean, whatever the weights sum up to.
+    let both = corners(&skinned([100, 100, 0, 0]).soup());
+    assert_eq!(both, placed(2.0, [0.0, 0.0, 4.0]));
+    // Inside out, so that each face has the other order.
+    let mut turned = placed(2.0, [0.0, 0.0, 7.0]);
+    turned.chunks_mut(3).for_each(|face| face.swap(1, 2));
+    assert_eq!(corners(&skinned([255, 0, 0, 0]).soup()), turned);
+    let document = skinned([255, 0, 0, 0]);
+    for (from, to, said) in [
+        ("\"skin\":0", "\"skin\":1", "nodes[0].skin = 1: found a reference to nothing; allowed: 0 to 0"),
+        (
+            "\"joints\":[1,2]",
+            "\"joints\":[9]",
+            "skins[0]: found joint 9, which the scene does not have; allowed: nodes of the scene",
+        ),
+        (
+            "\"joints\":[1,2]",
+            "\"joints\":[1,2,1]",
+            "skins[0]: found 2 inverseBindMatrices; allowed: one for each of its 3 joints",
+        ),
+        (
+            "\"MAT4\"",
+            "\"VEC3\"",
+            "accessors[4].type: found \"VEC3\"; allowed: MAT4, since a skin has it for its inverse bind matrices",
+        ),
+    ] {
+        refused(document.changed(from, to), said);
+    }
+    let mut beyond = skinned([0, 255, 0, 0]);
+    beyond.buffer[55] = 2;
+    refused(
+        beyond.read(),
+        "meshes[0].primitives[0]: found joint 2; allowed: joints of its skin, of which there are 2, from 0",
+    );
+}
+
+#[test]
+fn an_extension_that_a_file_requires_and_a_shape_may_depend_on_is_refused() {
+    let requires = |name: &str| {
+        let more = format!("\"extensionsRequired\":[\"{name}\"],\"nodes\":[");
+        Document::square().changed("\"nodes\":[{", &format!("{more}{{"))
+    };
+    for known in ["KHR_mesh_quantization", "KHR_materials_unlit", "KHR_texture_transform"] {
+        assert_eq!(corners(&requires(known).expect("a square")), corners(&square()), "{known}");
+    }
+    refused(
+        requires("EXT_mesh_gpu_instancing"),
+        "extensionsRequired: found EXT_mesh_gpu_instancing; allowed: what the shape does not depend on; export it without",
+    );
+}
+
 #[test]
 fn indices_and_positions_of_gltf_have_all_kinds_the_format_has() {
     let expected = corners(&square());

@@ -4,7 +4,7 @@ use super::buffers::Buffers;
 use super::document::{Accessor, Document, Sparse};
 use super::{missing, wrong};
 use crate::model::ModelError;
-use nalgebra::{SVector, Vector2, Vector3};
+use nalgebra::{Matrix4, SVector, Vector2, Vector3};
 
 pub(super) struct Accessors<'d> {
     document: &'d Document,
@@ -32,15 +32,33 @@ impl<'d> Accessors<'d> {
         self.vectors(index, &format!("{primitive}.attributes.TEXCOORD"), "texture coordinates")
     }
 
-    fn vectors<const N: usize>(
+    /// One for each joint of a skin.
+    pub(super) fn matrices(&mut self, index: usize, skin: &str) -> Result<Vec<Matrix4<f64>>, ModelError> {
+        let user = format!("{skin}.inverseBindMatrices");
+        let columns = self.of_kind::<16>("MAT4", index, &user, "inverse bind matrices")?;
+        Ok(columns.iter().map(|columns| Matrix4::from_column_slice(columns.as_slice())).collect())
+    }
+
+    pub(super) fn vectors<const N: usize>(
         &mut self,
         index: usize,
         user: &str,
         what: &str,
     ) -> Result<Vec<SVector<f64, N>>, ModelError> {
+        self.of_kind(&format!("VEC{N}"), index, user, what)
+    }
+
+    fn of_kind<const N: usize>(
+        &mut self,
+        allowed: &str,
+        index: usize,
+        user: &str,
+        what: &str,
+    ) -> Result<Vec<SVector<f64, N>>, ModelError> {
         let (place, accessor) = self.accessor(index, user)?;
-        if accessor.kind != format!("VEC{N}") {
-            return Err(kind(&place, accessor, &format!("VEC{N}, since a primitive has it for its {what}")));
+        if accessor.kind != allowed {
+            let whose = if N == 16 { "a skin" } else { "a primitive" };
+            return Err(kind(&place, accessor, &format!("{allowed}, since {whose} has it for its {what}")));
         }
         let component = Component::of(accessor.component_type)
             .filter(|component| *component != Component::U32)

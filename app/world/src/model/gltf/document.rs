@@ -20,6 +20,7 @@ pub(super) struct Document {
     scenes: Vec<Scene>,
     pub(super) nodes: Vec<Node>,
     pub(super) meshes: Vec<Mesh>,
+    pub(super) skins: Vec<Skin>,
     pub(super) materials: Vec<Material>,
     /// These three only matter to eyes: whoever reads them minds what they are.
     pub(super) textures: Value,
@@ -49,6 +50,9 @@ pub(super) struct Node {
     pub(super) name: Name,
     pub(super) children: Vec<usize>,
     pub(super) mesh: Option<usize>,
+    pub(super) skin: Option<usize>,
+    /// Of morph targets; else the mesh's.
+    pub(super) weights: Option<Vec<f64>>,
     pub(super) matrix: Option<Box<[f64; 16]>>,
     pub(super) translation: Option<[f64; 3]>,
     pub(super) rotation: Option<[f64; 4]>,
@@ -60,6 +64,14 @@ pub(super) struct Node {
 pub(super) struct Mesh {
     pub(super) name: Name,
     pub(super) primitives: Vec<Primitive>,
+    pub(super) weights: Vec<f64>,
+}
+
+#[derive(Deserialize, Default)]
+#[serde(rename_all = "camelCase", default)]
+pub(super) struct Skin {
+    pub(super) joints: Vec<usize>,
+    pub(super) inverse_bind_matrices: Option<usize>,
 }
 
 #[derive(Deserialize, Default)]
@@ -68,6 +80,7 @@ pub(super) struct Primitive {
     pub(super) material: Option<usize>,
     pub(super) attributes: Attributes,
     pub(super) indices: Option<usize>,
+    pub(super) targets: Vec<Attributes>,
     pub(super) mode: Option<u32>,
 }
 
@@ -96,6 +109,14 @@ impl From<Value> for Name {
 pub(super) struct Attributes {
     #[serde(rename = "POSITION")]
     pub(super) position: Option<usize>,
+    #[serde(rename = "JOINTS_0")]
+    pub(super) joints_0: Option<usize>,
+    #[serde(rename = "WEIGHTS_0")]
+    pub(super) weights_0: Option<usize>,
+    #[serde(rename = "JOINTS_1")]
+    pub(super) joints_1: Option<usize>,
+    #[serde(rename = "WEIGHTS_1")]
+    pub(super) weights_1: Option<usize>,
     #[serde(rename = "TEXCOORD_0")]
     pub(super) uv_0: Value,
     #[serde(rename = "TEXCOORD_1")]
@@ -216,6 +237,22 @@ impl Document {
                 let allowed = "geometry that is not compressed: export it without, or unpack it (`gltf-transform copy`)";
                 Err(wrong(key.into(), name.clone(), allowed))
             }
+            None => self.check_required(),
+        }
+    }
+
+    /// Without an extension that it requires, the shape may be another one.
+    fn check_required(&self) -> Result<(), ModelError> {
+        let is_known = |name: &&String| WITHOUT_SHAPE.iter().any(|begin| name.starts_with(begin));
+        match self.extensions_required.iter().find(|name| !is_known(name)) {
+            Some(name) => {
+                let found = name.escape_default().take(LONGEST_WORDS).collect();
+                Err(wrong(
+                    "extensionsRequired".into(),
+                    found,
+                    "what the shape does not depend on; export it without",
+                ))
+            }
             None => Ok(()),
         }
     }
@@ -241,4 +278,17 @@ impl Document {
 
 const COMPRESSED: [&str; 3] =
     ["KHR_draco_mesh_compression", "EXT_meshopt_compression", "KHR_meshopt_compression"];
+/// Beginnings of the names of extensions that change no shape, or are read.
+const WITHOUT_SHAPE: [&str; 10] = [
+    "KHR_mesh_quantization",
+    "KHR_materials_",
+    "KHR_texture_",
+    "EXT_texture_",
+    "MSFT_texture_",
+    "KHR_lights_",
+    "EXT_lights_",
+    "KHR_animation_",
+    "KHR_xmp",
+    "KHR_audio",
+];
 const LONGEST_WORDS: usize = 160;
