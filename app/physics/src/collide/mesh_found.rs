@@ -88,8 +88,12 @@ impl Found {
         contact.carried = self.carried.contains(&contact.id);
         contact.id |= (self.patch as u32) << PATCH_SHIFT;
         if let Some(there) = there {
-            // Of two right above each other the lower one presses: of both rims of a coin.
-            if there >= begin && contact.gap_m < self.contacts[there].gap_m - together_m {
+            // Of two right above each other the lower one presses: of both rims of a coin. Of two edges of one crossing the one
+            // that did in the last tick: by turns they would push in two directions.
+            let one = &self.contacts[there];
+            let deeper_m = one.gap_m - contact.gap_m;
+            let stays = contact.carried && !one.carried && deeper_m > -together_m;
+            if there >= begin && (deeper_m > together_m || stays) {
                 self.contacts[there] = contact;
             }
         } else if let Some(place) = self.contacts.get_mut(self.count) {
