@@ -92,7 +92,8 @@ impl Found {
             // that did in the last tick: by turns they would push in two directions.
             let one = &self.contacts[there];
             let deeper_m = one.gap_m - contact.gap_m;
-            let stays = contact.carried && !one.carried && deeper_m > -together_m;
+            let is_aside = one.normal_M.dot(&contact.normal_M) < AGREES;
+            let stays = contact.carried && !one.carried && is_aside && deeper_m > -together_m;
             if there >= begin && (deeper_m > together_m || stays) {
                 self.contacts[there] = contact;
             }

@@ -23,7 +23,7 @@ pub(super) fn in_box(cuboid: &Cuboid, point: &Vector3<f64>, along: &Vector3<f64>
     let half_m = Vector3::from(cuboid.size_m()) * 0.5;
     let depth_m = half_m[axis] - point[axis] * along[axis].signum();
     let is_through = if gap_m <= 0.0 {
-        depth_m < deep_m.max(MUCH * -gap_m + LITTLE_M)
+        depth_m < MUCH * -gap_m + LITTLE_M
     } else {
         let is_beside = (0..3).any(|other| other != axis && point[other].abs() > half_m[other]);
         (0.0..=deep_m).contains(&depth_m) && !is_beside

@@ -15,9 +15,8 @@
 //! Limits: six places a pair. Crossings are found of a box's edges, of the lines along which cylinders, cones and capsules
 //! touch, and of sharp edges that leave the vertices of a mesh that were chosen: of fine meshes these are short, but vertices
 //! lie as near. Rims of round forms are not cut off. An ellipsoid touches with one point: a flat one that tumbles comes down on its
-//! other end at once, and of twenty that were thrown at 6 m/s two came through a plate of 2 mm (of 5 mm none). A sheet has no
-//! inside: what is far behind it is taken for what has always been there, and limbs that are thin beside the way of a tick are
-//! lost now and then (`tests/all/meshes_sheets.rs` counts them).
+//! other end at once, deep, and is let out slowly. A sheet has no inside: what is far behind it is taken for what has always
+//! been there, and limbs that are thin beside the way of a tick are lost now and then (`tests/all/meshes_sheets.rs` counts them).
 //! Cost: for each place two choices of vertices and at most eight queries for the nearest point for each side; and a search
 //! when the two have moved by a millimetre; bounded.
 
@@ -57,7 +56,6 @@ pub(super) fn contact_points(
     if was_pressed && !patches.are_pressed() {
         // The plane of the last tick's points shows them no more: as if there had been none.
         let mut anew = *patches;
-        anew.all[0].is_known = false;
         if meet(mesh, other, reach_m, &mut anew) {
             let found_anew = find(mesh, other, [reach_m, travel_m], &mut anew);
             if anew.are_pressed() {
@@ -101,17 +99,10 @@ fn meet(mesh: &Mesh, other: &Other<'_>, reach_m: f64, patches: &mut Patches) -> 
         return false;
     }
     let [low_M, high_M] = mesh.bounds_B();
-    // Apart as they were a tick ago, they came in from where they were then: no farther than both go in two.
-    let was_apart = patches.all[0].is_known && !other.is_sheet();
-    let came_by_M = was_apart.then_some(-patches.all[0].normal_M);
-    let deep_m = if was_apart { 2.0 * (reach_m - crate::pair::REACH_M).max(0.0) } else { 0.0 };
-    // Else out of the larger one is where the smaller one's middle is.
+    // Out of the larger one is where the smaller one's middle is.
     let is_smaller = 0.5 * (high_M - low_M).norm() < radius_m;
     let middle_M = (low_M + high_M) * 0.5;
     let out_M = |at_M: &Vector3<f64>| {
-        if let Some(out_M) = came_by_M {
-            return out_M;
-        }
         let out_M = match (other.is_sheet(), is_smaller) {
             // Of a sheet, from where it is there to the middle: it has no inside that could tell.
             (true, _) => {
@@ -123,13 +114,13 @@ fn meet(mesh: &Mesh, other: &Other<'_>, reach_m: f64, patches: &mut Patches) -> 
         };
         out_M.try_normalize(0.0).unwrap_or_else(Vector3::y)
     };
-    let mut seen = other.see(&at_M, &out_M(&at_M), deep_m);
+    let mut seen = other.see(&at_M, &out_M(&at_M), 0.0);
     for _ in 0..TO_AND_FRO {
         at_M = mesh.nearest(&(at_M - seen.out * seen.gap_m)).point_B;
-        seen = other.see(&at_M, &out_M(&at_M), deep_m);
+        seen = other.see(&at_M, &out_M(&at_M), 0.0);
     }
     if let Some((lower, at_lower_M)) =
-        lowest(mesh, other, &at_M, deep_m).filter(|(lower, _)| lower.gap_m < seen.gap_m)
+        lowest(mesh, other, &at_M).filter(|(lower, _)| lower.gap_m < seen.gap_m)
     {
         (seen, at_M) = (Seen { out: -lower.out, ..lower }, at_lower_M);
     }
@@ -144,14 +135,14 @@ fn meet(mesh: &Mesh, other: &Other<'_>, reach_m: f64, patches: &mut Patches) -> 
 
 /// Of an ellipsoid that is over a flat face there: the point of it that lies lowest, as the mesh sees it, and what is below it. To
 /// and fro, a flat one comes to that in small steps only.
-fn lowest(mesh: &Mesh, other: &Other<'_>, at_M: &Vector3<f64>, deep_m: f64) -> Option<(Seen, Vector3<f64>)> {
+fn lowest(mesh: &Mesh, other: &Other<'_>, at_M: &Vector3<f64>) -> Option<(Seen, Vector3<f64>)> {
     let nearest = mesh.nearest(at_M);
     let normal_M = mesh.faces()[nearest.face as usize].normal_B;
     if nearest.feature != Feature::Face || mesh.sides() == Sides::Sheet {
         return None;
     }
     let point_M = other.lowest(&normal_M)?;
-    let seen = see(mesh, &point_M, &normal_M, deep_m);
+    let seen = see(mesh, &point_M, &normal_M, 0.0);
     Some((seen, point_M - seen.out * seen.gap_m))
 }
 
