@@ -129,6 +129,21 @@ fn a_plate_holds_what_has_limbs_however_fast_it_is_thrown() {
     }
 }
 
+/// Deep in a thin form the nearest side is the wrong one.
+#[test]
+fn discs_of_two_millimetres_hold_meshes_however_fast_they_are_thrown() {
+    let discs: [Shape; 2] =
+        [Cylinder::new(1.0, 2e-3).unwrap().into(), Ellipsoid::new([1.0, 1e-3, 1.0]).unwrap().into()];
+    for (disc, speed_m_s) in discs.iter().flat_map(|disc| [1.5, 6.0].map(|speed_m_s| (disc, speed_m_s))) {
+        let thrown = |random: &mut dyn FnMut() -> f64| {
+            [Vector3::new(0.02 * random(), 0.12, 0.02 * random()), -Vector3::y() * speed_m_s]
+        };
+        for mesh in [limbs(), build(make::uv_sphere(24, 12, 0.02)).into()] {
+            assert_eq!(escaped([&mesh, disc], 20, thrown, is_below), 0, "{speed_m_s} m/s");
+        }
+    }
+}
+
 /// Of a millimetre or a few, and how high their middles are at least when they rest: lying flat, to a tenth. The ellipsoid, which
 /// comes down on one point, is let out slowly where it came in deep.
 fn thin_forms() -> [(Shape, f64); 5] {
