@@ -7,7 +7,8 @@
 //! is room for all of it. File systems that copy what is written over (btrfs) promise no room: there it is tried behind the
 //! former content, and a copy of that is made first, among the temporary files, and put back if anything is refused. Pipes and
 //! devices are written directly, and so is a file without content whose directory takes no other. A link goes on leading to
-//! its file, which keeps its rights, owner and group; where they cannot be given to another file, its content is written over, too. What lies at the place by then and did not in the beginning is claimed before it is replaced:
+//! its file, which keeps its rights, owner and group; where they cannot be given to another file, or it has other names, access
+//! lists or other attributes, its content is written over, too. What lies at the place by then and did not in the beginning is claimed before it is replaced:
 //! a run may record into it. A process that catches signals calls [`abandon_all`] before it ends.
 //! Invariant: at the place there is the former file or the whole new one, whatever ends the process, unless that is
 //! killed while it copies; of an end that nobody catches a draft is left, whose name begins with a dot and ends in `.part`.
@@ -87,7 +88,7 @@ impl Replacement {
             Ok(_) => return Self::directly(path),
         };
         let (former, found) = former.unzip();
-        match (create_beside(&place, found.as_ref()), &former) {
+        match (create_beside(&place, former.as_ref().zip(found.as_ref())), &former) {
             (Ok((file, draft)), _) => Ok(Self::drafted(file, draft, false, place, former)),
             (Err(error), Some(content)) if content.metadata()?.len() > 0 => {
                 let (file, draft) = create_among_temporary_files(&place, &error)?;
@@ -271,10 +272,14 @@ fn rename_to_nothing(from: &Path, to: &Path) -> io::Result<()> {
     }
 }
 
-/// With the rights, the owner and the group of the file whose place it is to take.
-fn create_beside(place: &Path, former: Option<&Metadata>) -> io::Result<(File, PathBuf)> {
-    let (file, draft) = create_draft(place, place.parent().unwrap_or(Path::new("")), 0o666)?;
-    match former.map_or(Ok(()), |former| give_as(&file, former)) {
+/// With the rights, the owner and the group of the file whose place it is to take. Until it has them, nobody else may open it.
+fn create_beside(place: &Path, former: Option<(&File, &Metadata)>) -> io::Result<(File, PathBuf)> {
+    if let Some((former, found)) = former {
+        refuse_if_more_than_rights(former, found)?;
+    }
+    let mode = if former.is_some() { 0o600 } else { 0o666 };
+    let (file, draft) = create_draft(place, place.parent().unwrap_or(Path::new("")), mode)?;
+    match former.map_or(Ok(()), |(_, found)| give_as(&file, found)) {
         Ok(()) => Ok((file, draft)),
         Err(error) => {
             // It cannot take the place of the other one, and nobody else would remove it.
@@ -282,6 +287,19 @@ fn create_beside(place: &Path, former: Option<&Metadata>) -> io::Result<(File, P
             Err(error)
         }
     }
+}
+
+/// A file is refused that has other names, or attributes that another one would not get: access lists, xattr(7). Labels of
+/// security modules are given by the directory.
+fn refuse_if_more_than_rights(former: &File, found: &Metadata) -> io::Result<()> {
+    let bytes = rustix::fs::flistxattr_query(former).unwrap_or(0);
+    let mut names = vec![0; bytes];
+    let bytes = if bytes > 0 { rustix::fs::flistxattr(former, &mut names[..])? } else { 0 };
+    let mut names = names[..bytes].split(|byte| *byte == 0);
+    if found.nlink() > 1 || names.any(|name| !name.is_empty() && !name.starts_with(b"security.")) {
+        return Err(io::Error::other("what is there has other names, or attributes"));
+    }
+    Ok(())
 }
 
 fn give_as(file: &File, former: &Metadata) -> io::Result<()> {
@@ -497,6 +515,29 @@ mod tests {
         write(&place, "whole").expect("room");
         let found = place.metadata().expect("there");
         assert_eq!((found.uid(), found.gid(), found.mode() & 0o777), (1, 2, 0o640));
+    }
+
+    #[test]
+    fn a_former_file_with_other_names_or_attributes_is_written_over() {
+        let directory = tempfile::tempdir().expect("a directory");
+        let [place, other] = ["a", "b"].map(|name| directory.path().join(name));
+        std::fs::write(&place, "former").expect("room");
+        std::fs::hard_link(&place, &other).expect("another name");
+        assert!(!Replacement::begin(&place).expect("begun").is_beside());
+        write(&place, "whole").expect("room");
+        assert_eq!(std::fs::read(&other).expect("there"), b"whole");
+        std::fs::remove_file(&other).expect("our own");
+        assert!(Replacement::begin(&place).expect("begun").is_beside());
+        let set =
+            |place: &Path| rustix::fs::setxattr(place, "user.by", b"us", rustix::fs::XattrFlags::CREATE);
+        if set(&place).is_err() {
+            println!("skipped: attributes, which this file system does not take");
+            return;
+        }
+        assert!(!Replacement::begin(&place).expect("begun").is_beside());
+        write(&place, "whole again").expect("room");
+        assert_eq!(std::fs::read(&place).expect("there"), b"whole again");
+        set(&place).expect_err("it has it still");
     }
 
     #[test]

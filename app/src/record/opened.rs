@@ -16,8 +16,8 @@
 //! opened is not replaced. Noise that could not be cut off is told, and cut off with this
 //! value if that is possible by then. A file whose kind cannot be told is refused.
 //! Limit: what others write between a look at the file and the call that undoes the start (some microseconds) is lost; and what
-//! they write over an earlier content in the same tick of the system's clock (4 ms at most) and to the same length. A content of
-//! others is known by its length and by samples (`marks.rs`), which has limits of its own.
+//! they write over an earlier content in the same tick of the system's clock (4 ms at most), or while room is reserved, to the
+//! same length, in the latter case with the same beginning and end. A content of others is known by its length and by samples (`marks.rs`), which has limits of its own.
 
 use super::content::{Content, ContentState};
 use super::destination::{is_standard_output, shown};
@@ -73,6 +73,8 @@ struct Reserved {
 
 /// Held while the content of a file is replaced.
 static ALONE: Mutex<()> = Mutex::new(());
+/// Bytes at either end of a content by which it is known again.
+const END_BYTES: usize = 1 << 12;
 /// At least as large as what a file system takes for a byte.
 const BLOCK_BYTES: usize = 1 << 17;
 
@@ -223,8 +225,13 @@ impl Opened {
         self.check_earlier(&found)?;
         let earlier = self.reserved.get();
         let before = earlier.map_or_else(|| found.modified(), |earlier| Ok(earlier.changed[0]))?;
+        let ends = self.ends(found.len());
         let reserved = fallocate(&self.file, FallocateFlags::KEEP_SIZE, 0, bytes);
         let now = self.file.metadata()?;
+        // It changes the time itself.
+        if now.len() != found.len() || self.ends(now.len()) != ends {
+            return Err(written_by_others());
+        }
         let is_more = earlier.is_some_and(|earlier| earlier.is_more) || now.blocks() > found.blocks();
         self.reserved.set(Some(Reserved { changed: [before, now.modified()?], is_more }));
         self.note_as_left();
@@ -246,9 +253,16 @@ impl Opened {
             return Err(io::Error::other("its name leads to another file by now, or to none"));
         }
         if !self.left.get().is_none_or(is_as_left) {
-            return Err(io::Error::other("others have written to it since it was opened"));
+            return Err(written_by_others());
         }
         Ok(())
+    }
+
+    /// First and last bytes of a content of this length; `None`: it may be written and not read.
+    fn ends(&self, length: u64) -> Option<[Vec<u8>; 2]> {
+        let first = self.contents_first(END_BYTES).ok()?;
+        let last = length.saturating_sub(END_BYTES as u64);
+        Some([first, self.contents_from(last, END_BYTES).ok()?])
     }
 
     /// The content is as it is by what was done here.
@@ -388,7 +402,8 @@ impl Opened {
         let block = vec![HALF_REPLACED; BLOCK_BYTES];
         if let Some(mut trial) = self.nameless_beside().map_err(NotReplaced::at_all)? {
             let tried = [piece, replaced, &block].into_iter().try_for_each(|part| trial.write_all(part));
-            return tried.map_err(NotReplaced::at_all);
+            let is_as_left = || self.check_earlier(&self.file.metadata()?);
+            return tried.and_then(|()| is_as_left()).map_err(NotReplaced::at_all);
         }
         self.try_room_behind([&block, piece, replaced], |length| self.cut(length))
     }
@@ -435,11 +450,16 @@ impl Opened {
 
     /// So many bytes of the content, or all of it if that is less.
     fn contents_first(&self, bytes: usize) -> io::Result<Vec<u8>> {
+        self.contents_from(0, bytes)
+    }
+
+    fn contents_from(&self, at: u64, bytes: usize) -> io::Result<Vec<u8>> {
         // It was opened for writing alone.
-        let file = File::open(format!("/proc/self/fd/{}", self.file.as_raw_fd()))?;
-        let mut first = Vec::new();
-        file.take(bytes as u64).read_to_end(&mut first)?;
-        Ok(first)
+        let mut file = File::open(format!("/proc/self/fd/{}", self.file.as_raw_fd()))?;
+        file.seek(io::SeekFrom::Start(at))?;
+        let mut some = Vec::new();
+        file.take(bytes as u64).read_to_end(&mut some)?;
+        Ok(some)
     }
 
     /// Notes a piece that is in the file now, at this place.
@@ -607,6 +627,10 @@ pub fn begin_all<T>(
     Ok(begun.into_iter().map(|(_, file)| file).collect())
 }
 
+fn written_by_others() -> io::Error {
+    io::Error::other("others have written to it since it was opened")
+}
+
 /// The name still leads to this file, which somebody may have removed before it was claimed.
 fn is_at(file: &File, path: &Path) -> bool {
     let identity = |found: Metadata| (found.dev(), found.ino());
@@ -625,23 +649,16 @@ fn is_itself(file: &File, path: &Path) -> bool {
 
 /// The file, and its name if it was not there.
 fn open_or_make(path: &Path) -> io::Result<(File, Option<PathBuf>)> {
-    let make = |place: &Path| output_file::open(place, OpenOptions::new().write(true).create_new(true));
-    let is_there = |error: &io::Error| error.kind() == io::ErrorKind::AlreadyExists;
-    let made = match make(path) {
-        // A link to a file that is not there.
-        Err(error) if is_there(&error) && !path.exists() => {
-            let place = end_of_links(path)?;
-            make(&place).map(|file| (file, place))
-        }
-        made => made.map(|file| (file, path.into())),
-    };
-    match made {
-        Ok((file, place)) => Ok((file, Some(place))),
-        Err(error) if is_there(&error) => {
-            Ok((output_file::open(path, OpenOptions::new().write(true).create(true))?, None))
-        }
-        Err(error) => Err(error),
+    match output_file::open(path, OpenOptions::new().write(true).create_new(true)) {
+        Err(error) if error.kind() == io::ErrorKind::AlreadyExists => {}
+        made => return made.map(|file| (file, Some(path.into()))),
     }
+    // A link may lead to a file that is not there. The system follows it, or does not: in a directory of all a link of others may
+    // be meant to have us make a file elsewhere.
+    let is_absent = path.metadata().is_err_and(|error| error.kind() == io::ErrorKind::NotFound);
+    let file = output_file::open(path, OpenOptions::new().write(true).create(true))?;
+    let made = end_of_links(path).ok().filter(|place| is_absent && is_itself(&file, place));
+    Ok((file, made))
 }
 
 #[cfg(test)]

@@ -1,21 +1,21 @@
 //! Driver processes that listen, whatever became of their sockets' files.
 //!
-//! Model: processes of a driver's name are looked through, those of root and our own user first. Which listening sockets are
-//! theirs the kernel tells of those whose descriptors we may see: for root all, else our own. Of others it only tells the name
-//! under which a socket was made, which for a driver's ends with the process's number. A driver with a network of its own, as a
-//! service has, is in that network's table alone; so the table of each network in which such a process lives is read
-//! ([`socket_table`](super::socket_table)).
+//! Model: processes of a driver's name are looked through, those of root and our own user first. Where these listen their own
+//! [sockets](held_sockets) tell root, and others where the system lets them trace their own processes. Else the kernel's table
+//! of sockets is read ([`socket_table`](super::socket_table)): with the numbers of the sockets that a process holds, if we may
+//! see them, or by the names under which sockets were made, which for a driver's end with the process's number. A driver with
+//! a network of its own, as a service has, is in that network's table alone.
 //! Trust: anybody may give a process that name, make sockets for it, write lines into the table, and change what a name leads
-//! to. So a driver is *certain* to listen at a path only if whoever is connected to there is that process, as the kernel says; no
-//! other path is to be used. And whoever is neither root, nor we, nor the owner of the place that is asked about, nor of the group
+//! to. So a driver is *certain* to listen at a path only if whoever is connected to there is that process, as the kernel says, and
+//! of root or our own user, for a socket outlives the process by which it was made to listen; no other path is to be used. And whoever is neither root, nor we, nor the owner of the place that is asked about, nor of the group
 //! that may make files there, does not listen there. A process whose users differ, as that of a program with its owner's rights,
 //! is that of whoever started it.
-//! Bound: whoever stops motors waits for the search, and for comparing paths, [`PATIENCE`] each, but for one path; and is told
+//! Bound: whoever stops motors waits for the search, and for comparing names of each place, [`PATIENCE`]; and is told
 //! that it was cut short. Directories are compared in full, without symbolic links and detours.
 
 use std::cell::Cell;
-use std::collections::{BTreeSet, HashMap};
-use std::fs::File;
+use std::collections::HashMap;
+use std::fs::{File, Metadata};
 use std::io::Read;
 use std::os::fd::AsFd;
 use std::os::unix::ffi::OsStrExt;
@@ -28,7 +28,8 @@ use shm_abi::peer::Peer;
 use shm_abi::socket_file::whole_path;
 use shm_abi::users::known_user;
 
-use super::socket_table::{Table, Whose};
+use super::held_sockets;
+use super::socket_table::{Table, Whose, made_as};
 
 /// Names of a driver's program: by itself, or within the application.
 const PROGRAMS: [&str; 2] = ["io-driver", "phantom3"];
@@ -81,13 +82,13 @@ impl Owner {
         self.user.is_some_and(|user| user == 0 || user == own_uid())
     }
 
-    /// No stranger, or one who may make files in the directory of this place by its owner or group.
-    fn may_be_at(&self, place: &Path) -> bool {
-        let may_make = |directory: std::fs::Metadata| {
+    /// No stranger, or one who may make files in this directory as its owner or by its group.
+    fn may_be_in(&self, directory: Option<&Metadata>) -> bool {
+        let may_make = |directory: &Metadata| {
             let is_of_group = directory.mode() & 0o020 != 0 && self.groups.contains(&directory.gid());
             self.user.is_some_and(|user| known_user(directory.uid()) == Some(user) || is_of_group)
         };
-        self.is_ours() || directory_of(place).is_some_and(may_make)
+        self.is_ours() || directory.is_some_and(may_make)
     }
 }
 
@@ -99,9 +100,13 @@ impl Listener {
 
     /// With who is there.
     fn looked_at(self) -> Self {
-        let there = match process_at(&self.socket) {
-            Some(pid) if pid == self.pid => There::Itself,
-            Some(_) => There::Other,
+        let is_itself = |peer: Peer| {
+            let is_ours = peer.user().is_some_and(|user| user == 0 || user == own_uid());
+            is_ours && peer.pid == self.pid
+        };
+        let there = match peer_at(&self.socket).map(is_itself) {
+            Some(true) => There::Itself,
+            Some(false) => There::Other,
             None => There::Nobody,
         };
         Self { there, ..self }
@@ -137,20 +142,27 @@ impl Listeners {
             if !is_time_left() {
                 break;
             }
+            let directory = std::fs::read_link(format!("/proc/{pid}/cwd")).unwrap_or_default();
+            let mut add = |name: &Path| {
+                let (owner, socket) = (owner.clone(), directory.join(made_as(name)));
+                let listener = Listener { pid, owner, socket, there: There::Nobody };
+                let may_look = listener.is_ours() && listener.socket.is_absolute();
+                all.push(if may_look { listener.looked_at() } else { listener });
+            };
+            // What a stranger holds says no more than what he calls it.
+            let told = if owner.is_ours() { held_sockets::listening(pid, is_time_left).ok() } else { None };
+            if let Some(names) = told {
+                names.iter().take_while(|_| is_time_left()).for_each(|name| add(name));
+                continue;
+            }
             // A network has one file of this number; a process that has ended has none.
             let path = format!("/proc/{pid}/net/unix");
             let Ok(network) = std::fs::metadata(&path).map(|found| found.ino()) else { continue };
             let table: &mut Table = tables.entry(network).or_default();
-            // What a stranger holds says no more than what he calls it.
-            let held = if owner.is_ours() { held_sockets(pid, is_time_left) } else { None };
+            let held = if owner.is_ours() { held_sockets::numbers(pid, is_time_left) } else { None };
             let whose = held.map_or_else(|| Whose::Named(own_number(&status).unwrap_or(pid)), Whose::Held);
-            let directory = std::fs::read_link(format!("/proc/{pid}/cwd")).unwrap_or_default();
-            for name in table.sockets_of(&whose, || read_within(&path, is_time_left)) {
-                let (owner, socket) = (owner.clone(), directory.join(name));
-                let listener = Listener { pid, owner, socket, there: There::Nobody };
-                let may_look = listener.is_ours() && listener.socket.is_absolute() && is_time_left();
-                all.push(if may_look { listener.looked_at() } else { listener });
-            }
+            let names = table.sockets_of(&whose, || read_within(&path, is_time_left));
+            names.take_while(|_| is_time_left()).for_each(add);
         }
         all.sort_by_key(|listener| (!listener.is_ours(), listener.there));
         found.all = all;
@@ -162,24 +174,25 @@ impl Listeners {
         let begun = Instant::now();
         let wanted =
             [std::path::absolute(place).ok(), Some(whole_path(place)), std::fs::canonicalize(place).ok()];
+        let directory = directory_of(place);
         let mut others = self
             .all
             .iter()
-            .filter(|listener| listener.socket.is_absolute() && listener.owner.may_be_at(place));
+            .take_while(|_| {
+                let is_late = begun.elapsed() > PATIENCE;
+                self.is_cut_short.set(self.is_cut_short.get() || is_late);
+                !is_late
+            })
+            .filter(|listener| listener.socket.is_absolute() && listener.owner.may_be_in(directory.as_ref()));
         // Names first, for paths take time.
         let is_named =
             |listener: &&Listener| wanted.iter().flatten().any(|wanted| is_told_as(wanted, &listener.socket));
         if let Some(listener) = others.clone().find(is_named) {
             return Some(listener.pid);
         }
-        let listener = others.find(|listener| {
-            if begun.elapsed() > PATIENCE {
-                self.is_cut_short.set(true);
-                return false;
-            }
-            wanted.contains(&Some(whole_path(&listener.socket)))
-        });
-        listener.map(|listener| listener.pid)
+        others
+            .find(|listener| wanted.contains(&Some(whole_path(&listener.socket))))
+            .map(|listener| listener.pid)
     }
 
     /// There may be others.
@@ -188,20 +201,20 @@ impl Listeners {
     }
 }
 
-/// True for the name by which the kernel's table tells of a path: a line of it ends at the first end of a line.
+/// True for a path, and for the name by which the kernel's table tells of it: a line of that ends at the first end of a line.
 fn is_told_as(path: &Path, name: &Path) -> bool {
     let bytes = path.as_os_str().as_bytes();
-    bytes.split(|byte| *byte == b'\n').next() == Some(name.as_os_str().as_bytes())
+    path == name || bytes.split(|byte| *byte == b'\n').next() == Some(name.as_os_str().as_bytes())
 }
 
-/// The process that listens at a path, as the kernel tells whoever connects. Never waits.
-fn process_at(path: &Path) -> Option<u32> {
+/// Who listens at a path, or began to, as the kernel tells whoever connects. Never waits.
+fn peer_at(path: &Path) -> Option<Peer> {
     let address = SocketAddrUnix::new(path).ok()?;
     let flags = SocketFlags::CLOEXEC | SocketFlags::NONBLOCK;
     let asking = socket_with(AddressFamily::UNIX, SocketType::STREAM, flags, None).ok()?;
     connect(&asking, &address).ok()?;
     // None that is visible here has the number 0, which no process of ours has.
-    Peer::of(asking.as_fd()).ok().map(|listener| listener.pid)
+    Peer::of(asking.as_fd()).ok()
 }
 
 /// The text of a table, or its whole lines as far as there was time.
@@ -229,7 +242,7 @@ fn own_uid() -> u32 {
 }
 
 /// The directory of a place, or the part of the way there that is left.
-fn directory_of(place: &Path) -> Option<std::fs::Metadata> {
+fn directory_of(place: &Path) -> Option<Metadata> {
     let place = std::path::absolute(place).ok()?;
     place.ancestors().skip(1).find_map(|directory| std::fs::metadata(directory).ok())
 }
@@ -256,21 +269,6 @@ fn drivers(is_time_left: impl Fn() -> bool) -> Vec<(u32, String, Owner)> {
 /// A process's number where it lives, proc(5): in a container it names its socket by that.
 fn own_number(status: &str) -> Option<u32> {
     status.lines().find_map(|line| line.strip_prefix("NSpid:"))?.split_whitespace().next_back()?.parse().ok()
-}
-
-/// Numbers of the sockets that a process has; `None`: we may not see them, or there is no time.
-fn held_sockets(pid: u32, is_time_left: impl Fn() -> bool) -> Option<BTreeSet<u64>> {
-    let mut held = BTreeSet::new();
-    for entry in std::fs::read_dir(format!("/proc/{pid}/fd")).ok()? {
-        let link = std::fs::read_link(entry.ok()?.path()).unwrap_or_default();
-        let number: Option<u64> =
-            link.to_str().and_then(|link| link.strip_prefix("socket:[")?.strip_suffix(']')?.parse().ok());
-        held.extend(number);
-        if !is_time_left() {
-            return None;
-        }
-    }
-    Some(held)
 }
 
 #[cfg(test)]
@@ -310,14 +308,13 @@ mod tests {
     fn our_own_sockets_are_known_by_our_descriptors() {
         let directory = tempfile::tempdir().expect("a directory");
         let listener = UnixListener::bind(directory.path().join("s")).expect("a socket");
-        let held = held_sockets(std::process::id(), || true).expect("our own");
+        let held = held_sockets::numbers(std::process::id(), || true).expect("our own");
         let text = std::fs::read("/proc/self/net/unix").expect("the table");
         let whose = Whose::Held(held);
         let mut table = Table::default();
         let mut sockets = table.sockets_of(&whose, || Some(text.clone()));
         assert!(sockets.any(|socket| socket == directory.path().join("s")));
         drop(listener);
-        assert_eq!(held_sockets(std::process::id(), || false), None, "no time");
     }
 
     #[test]

@@ -156,6 +156,36 @@ fn a_file_whose_kind_the_system_does_not_tell_keeps_its_earlier_recording() {
     assert!(kept > 0, "no look at the file was refused");
 }
 
+/// strace makes the reserving of room take long, as on a busy disk; somebody copies another file over the recording meanwhile.
+#[test]
+fn what_others_write_while_room_is_reserved_is_kept() {
+    let place = workplace("0");
+    if !Command::new("strace").arg("-V").stdout(Stdio::null()).bounded_status().is_ok_and(|end| end.success())
+    {
+        eprintln!("skipped: there is no strace");
+        return;
+    }
+    let earlier = place.write("out.csv", "earlier");
+    let blocks = || std::os::unix::fs::MetadataExt::blocks(&earlier.metadata().expect("there"));
+    for others in ["others' and longer", "others'"] {
+        std::fs::write(&earlier, "earlier").expect("room");
+        let before = blocks();
+        let program = place.phantom3();
+        let mut strace = place.prepare(Command::new("strace"));
+        strace.args(["-f", "-qq", "-o", "/dev/null", "-e", "trace=fallocate", "-e"]);
+        strace.arg("inject=fallocate:delay_exit=1500000").arg("-P").arg(&earlier);
+        strace.arg(program.get_program()).args(["run", "scene.toml", "--clock", "virtual", "--headless"]);
+        strace.args(["--seconds", "0.1", "--record", "out.csv"]);
+        let run = Running::start(strace);
+        patience::until("room", || blocks() > before);
+        std::fs::write(&earlier, others).expect("room");
+        let said = run.wait();
+        assert_ne!(said.status, Some(0), "{}", said.err);
+        assert!(said.err.contains("others have written to it"), "{}", said.err);
+        assert_eq!(std::fs::read_to_string(&earlier).expect("there"), others);
+    }
+}
+
 /// The pipe holds the export up until a run records into a new file of the name.
 #[test]
 fn an_export_does_not_replace_what_a_run_records_into_whether_or_not_a_table_was_there_before() {

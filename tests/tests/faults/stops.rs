@@ -190,6 +190,29 @@ fn a_socket_that_a_stranger_names_by_a_drivers_number_is_not_told_as_its() {
     assert!(end.err.contains(&words) && !end.err.contains(&*decoy.to_string_lossy()), "{end:?}");
 }
 
+/// A line of the kernel's table says that the driver's socket has another name: of a name with an end of a line in it.
+#[test]
+fn what_others_write_of_a_drivers_socket_is_not_believed_where_its_own_sockets_tell() {
+    if !rustix::process::geteuid().is_root() {
+        println!("skipped: sockets of other processes, which need root");
+        return;
+    }
+    let (places, elsewhere) = (Places::new(), tempfile::tempdir().expect("a directory"));
+    let driver = driver_at(places.second());
+    let name = format!("{}.{}", places.second().display(), driver.child.id());
+    let table = std::fs::read_to_string("/proc/net/unix").expect("the table");
+    let line =
+        table.lines().find(|line| line.ends_with(&name) && line.contains(" 00010000 ")).expect("a line");
+    let number = line.split_whitespace().nth(6).expect("a number");
+    let forged = format!("x\n0 0 0 10000 0001 0 {number} {}.7", places.first().display());
+    let forged = elsewhere.path().join(forged);
+    std::fs::create_dir_all(forged.parent().expect("a directory")).expect("it is made");
+    let _forged = UnixDatagram::bind(&forged).expect("a socket");
+    let end = places.ask(&["emergency-stop"]);
+    assert_eq!((end.status, end.err.as_str()), (Some(0), ""), "{end:?}");
+    assert!(is_stopped(&driver));
+}
+
 /// At another place somebody takes the request, and answers nothing.
 #[test]
 fn an_emergency_stop_that_one_driver_shows_and_another_does_not_answer_is_not_done() {
