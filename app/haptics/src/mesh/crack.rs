@@ -13,8 +13,6 @@
 //!
 //! Frames and signs: object frame B; `out` is along a face, away from it.
 //! Invariant: whatever is passed over is narrower than twice [`widest_m`] and lower than 1.5 times that.
-//! Limit: a part that hovers above the face of another one, nearer than a step but without touching it or a wall of its own size,
-//! stands in nobody's way along that face: a point slides in below.
 //! Cost: nothing where no other part is near ([`beside`](super::beside)); else up to five questions to the hierarchy for each
 //! direction, at most [`MOST_WAYS`], where an edge or a vertex lets the HIP go, and one where it holds.
 

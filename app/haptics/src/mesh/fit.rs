@@ -12,7 +12,7 @@
 //! corners stay where they were.
 //! Frames: object frame B.
 //! Limit: what is moved is felt, too, where it is not hidden: a bore is narrower by twice 12 um if its ring is smaller than the
-//! pin. Faces smaller than a few cracks stay, and the cracks beside them.
+//! pin.
 //! Cost: linear in the faces; nothing where none fit.
 
 use nalgebra::{Matrix3, Vector3};

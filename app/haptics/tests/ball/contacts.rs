@@ -4,7 +4,7 @@ use crate::common::meshes::{built, cube, step, touchable, wedge};
 use crate::common::*;
 use haptics::mesh::{Mesh, TriangleSoup};
 use haptics::{ContactState, Entity, Feature, Friction};
-use nalgebra::Vector3;
+use nalgebra::{Isometry3, UnitQuaternion, Vector3};
 use std::slice::from_ref;
 use std::sync::Arc;
 
@@ -179,4 +179,28 @@ fn the_torque_of_a_sliding_ball_is_that_of_friction_at_its_lowest_point() {
         let points = finger.touch_points(from_ref(&entity), 0);
         assert!((points.as_slice()[0].point_W.y - 0.05).abs() < 1e-15);
     }
+}
+
+/// A finger has no orientation: one that sticks goes along as if it were glued to what turns.
+#[test]
+fn a_ball_that_sticks_goes_along_with_what_turns_and_does_not_roll_on_it() {
+    let plane = haptics::Plane::new(Vector3::y(), 0.0).unwrap();
+    let mut entity = Entity::new(plane, Isometry3::identity(), K).unwrap();
+    entity = entity.with_friction(Friction::coulomb(1.0).unwrap()).unwrap();
+    let mut finger = finger(R);
+    step(&mut finger, &entity, &Vector3::new(0.0, 0.05, 0.0));
+    let hip = Vector3::new(0.0, R - 2e-3, 0.0);
+    step(&mut finger, &entity, &hip);
+    let angle = 0.05;
+    let mut out = None;
+    for i in 0..=100 {
+        let turn = Vector3::z() * (angle * f64::from(i) / 100.0);
+        entity.X_WB.rotation = UnitQuaternion::from_scaled_axis(turn);
+        out = Some(step(&mut finger, &entity, &hip));
+    }
+    // As long as r k angle is below mu k d. Roundings of 0.01 m in a hundred turns.
+    let led = Vector3::new(-angle.sin(), angle.cos(), 0.0) * R;
+    let out = out.unwrap();
+    assert!((out.god_object_W - led).norm() < 1e-14, "{:?}", out.god_object_W);
+    assert!((out.force_on_user_W - (led - hip) * K).norm() < 1e-11, "{:?}", out.force_on_user_W);
 }
