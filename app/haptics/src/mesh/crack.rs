@@ -141,11 +141,7 @@ pub(super) fn over_wall(
     let along = |v_B: &Vector3<f64>| v_B - facet.normal_B * facet.normal_B.dot(v_B);
     // A way that ends at once has no direction of its own.
     let way_B = along(way_B).try_normalize(0.0).or_else(|| along(&(hip_B - at_B)).try_normalize(0.0))?;
-    let is_wall = || {
-        let within_B = at_B - way_B * (2.0 * widest_m(mesh.extent_m));
-        has_part_before(mesh, &within_B, &facet.normal_B)
-    };
-    if facet.depth_m(hip_B) <= 0.0 || is_wall() { None } else { step(mesh, facet, at_B, &way_B) }
+    if facet.depth_m(hip_B) <= 0.0 { None } else { step(mesh, facet, at_B, &way_B) }
 }
 
 /// True for a wall that is parallel to a face, or from which a parallel face is at most two edges away: another part's foot
@@ -175,15 +171,6 @@ pub(super) fn off_crossing(
         let is_beyond = along_B.norm() > 2.0 * widest_m(mesh.extent_m);
         if is_beyond { over_ledge(mesh, [side, wall], at_B, &along_B, hip_B) } else { None }
     })
-}
-
-/// True if another part is so near in front of a wall, and faces it, that there is no crack to a finger, or hides it.
-fn has_part_before(mesh: &Mesh, at_B: &Vector3<f64>, normal_B: &Vector3<f64>) -> bool {
-    let before_B = at_B + normal_B * (STEP * widest_m(mesh.extent_m));
-    mesh.is_inside(&before_B)
-        && mesh
-            .first_hit(at_B, &before_B)
-            .is_none_or(|hit| Facet::of(mesh, Place::hit(&hit).on.side()).normal_B.dot(normal_B) < -ALIKE)
 }
 
 /// Height of a step, in widths of the widest crack: over a ledge of that height.
