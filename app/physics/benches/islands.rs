@@ -2,7 +2,8 @@
 //!
 //! `cargo bench -p physics --bench islands`; quote medians and ratios of one run. *At rest*: the whole tick of a stack on the
 //! floor (contact points, forces, motion). *Cold*: the solver alone, which knows nothing of the last tick. *Falling*: the
-//! solver alone, in a tick in which forces change.
+//! solver alone, in a tick in which forces change. *Top*: of cubes of 50 g and 40 mm the top one is as heavy as so many, beside
+//! MuJoCo's times by `tests/referee/stack_times.py`.
 #![allow(missing_docs, reason = "the macros of criterion")]
 #![allow(non_snake_case)] // Names carry their frame.
 
@@ -11,7 +12,9 @@ use std::hint::black_box;
 use criterion::{BatchSize, Criterion, criterion_group, criterion_main};
 use haptics::{Cuboid, Entity, Friction, Plane};
 use nalgebra::{Isometry3, Vector3};
-use physics::{Body, Manipulation, MassProperties, Motion, Response, Row, Settings, Solver};
+use physics::{
+    Body, ContactStiffness, Manipulation, MassProperties, Motion, Response, Row, Settings, Solver,
+};
 
 const DT: f64 = 1e-3;
 const EDGE: f64 = 0.02;
@@ -22,19 +25,25 @@ fn with_friction(entity: Entity) -> Entity {
 
 /// Cubes of 10 g on each other that have come to rest.
 fn stack(count: usize, response: Response) -> (Vec<Entity>, Manipulation) {
+    stack_of(&vec![0.01; count], EDGE, Settings { response, ..Settings::default() })
+}
+
+/// Cubes of these masses (kg), the lowest first.
+fn stack_of(masses_kg: &[f64], edge_m: f64, settings: Settings) -> (Vec<Entity>, Manipulation) {
+    let count = masses_kg.len();
     let plane = Plane::new(Vector3::y(), 0.0).expect("a normal");
     let floor = Entity::new(plane, Isometry3::identity(), 5000.0).expect("in range");
     let mut entities = vec![with_friction(floor)];
     entities.extend((0..count).map(|place| {
-        let at = Isometry3::translation(0.0, EDGE * (place as f64 + 0.5), 0.0);
-        let cube = Entity::new(Cuboid::new([EDGE; 3]).expect("in range"), at, 5000.0).expect("in range");
+        let at = Isometry3::translation(0.0, edge_m * (place as f64 + 0.5), 0.0);
+        let cube = Entity::new(Cuboid::new([edge_m; 3]).expect("in range"), at, 5000.0).expect("in range");
         with_friction(cube.with_damping(1.0).expect("in range"))
     }));
-    let body = |entity: &Entity| {
-        Body::at_rest(MassProperties::of_shape(&entity.shape, 0.01).expect("a mass"), &entity.X_WB)
+    let body = |entity: &Entity, mass_kg: f64| {
+        Body::at_rest(MassProperties::of_shape(&entity.shape, mass_kg).expect("a mass"), &entity.X_WB)
     };
-    let bodies: Vec<_> = (1..=count).map(|index| (index, body(&entities[index]))).collect();
-    let settings = Settings { response, ..Settings::default() };
+    let bodies: Vec<_> =
+        (1..=count).map(|index| (index, body(&entities[index], masses_kg[index - 1]))).collect();
     let mut manipulation = Manipulation::new(&entities, &bodies, settings).expect("bodies");
     for _ in 0..3000 {
         manipulation.step(&mut entities, &mut [], DT);
@@ -90,5 +99,20 @@ fn stacks(criterion: &mut Criterion) {
     group.finish();
 }
 
-criterion_group!(benches, stacks);
+fn heavy_tops(criterion: &mut Criterion) {
+    let mut group = criterion.benchmark_group("top");
+    for (count, times) in [2, 3, 5, 10].into_iter().flat_map(|count| [(count, 1.0), (count, 100.0)]) {
+        let mut masses_kg = vec![0.05; count];
+        masses_kg[count - 1] *= times;
+        let contact_stiffness = ContactStiffness::ByMass { damping_ratio: 1.0 };
+        let settings = Settings { contact_stiffness, ..Settings::default() };
+        let (mut entities, mut manipulation) = stack_of(&masses_kg, 0.04, settings);
+        group.bench_function(format!("{count} cubes, {times} times"), |bench| {
+            bench.iter(|| black_box(manipulation.step(&mut entities, &mut [], DT)));
+        });
+    }
+    group.finish();
+}
+
+criterion_group!(benches, stacks, heavy_tops);
 criterion_main!(benches);
