@@ -145,7 +145,7 @@ fn what_cannot_be_drawn_or_written_is_told() {
 #[test]
 fn a_disk_that_fills_up_has_whole_pictures_only() {
     let place = place();
-    let mount = "mkdir small && mount -t tmpfs -o size=200k tmpfs small";
+    let mount = "mkdir small && mount -t tmpfs -o size=100k tmpfs small";
     let private = "unshare --user --map-root-user --mount sh -c";
     if place.shell(&format!("exec {private} '{mount}'"), &[]).status != Some(0) {
         eprintln!("skipped: no small disk can be mounted here");
