@@ -126,25 +126,35 @@ fn an_export_that_a_signal_ends_leaves_the_earlier_tables_and_nothing_else() {
     assert_eq!(hidden(&place), Vec::<String>::new());
 }
 
+const RECORDS: [&str; 9] =
+    ["run", "scene.toml", "--clock", "virtual", "--headless", "--seconds", "0.1", "--record", "out.csv"];
+
+/// `phantom3` below strace, which writes what it sees into the file `trace`; `None`: there is no strace.
+fn traced(place: &Workplace, options: &[&str], arguments: &[&str]) -> Option<Command> {
+    if !Command::new("strace").arg("-V").stdout(Stdio::null()).bounded_status().is_ok_and(|end| end.success())
+    {
+        eprintln!("skipped: there is no strace");
+        return None;
+    }
+    let mut strace = place.prepare(Command::new("strace"));
+    strace.args(["-f", "-qq", "-o", "trace"]).args(options);
+    strace.arg(place.phantom3().get_program()).args(arguments);
+    Some(strace)
+}
+
 /// strace makes one look of the run at its file after the other fail, as a file system over a network does.
 #[test]
 fn a_file_whose_kind_the_system_does_not_tell_keeps_its_earlier_recording() {
     let place = workplace("0");
-    if !Command::new("strace").arg("-V").stdout(Stdio::null()).bounded_status().is_ok_and(|end| end.success())
-    {
-        eprintln!("skipped: there is no strace; a test of the module covers the same");
-        return;
-    }
     let earlier = place.write("out.csv", "earlier");
     let mut kept = 0;
     for number in 1..12 {
         std::fs::write(&earlier, "earlier").expect("room");
-        let program = place.phantom3();
-        let mut strace = place.prepare(Command::new("strace"));
-        strace.args(["-f", "-qq", "-o", "/dev/null", "-e", "trace=statx", "-e"]);
-        strace.arg(format!("inject=statx:error=EIO:when={number}")).arg("-P").arg(&earlier);
-        strace.arg(program.get_program()).args(["run", "scene.toml", "--clock", "virtual", "--headless"]);
-        strace.args(["--seconds", "0.1", "--record", "out.csv"]);
+        let inject = format!("inject=statx:error=EIO:when={number}");
+        let Some(strace) = traced(&place, &["-e", "trace=statx", "-e", &inject, "-P", "out.csv"], &RECORDS)
+        else {
+            return;
+        };
         let said = Running::start(strace).wait();
         if std::fs::read(&earlier).expect("there") == b"earlier" {
             kept += 1;
@@ -160,22 +170,17 @@ fn a_file_whose_kind_the_system_does_not_tell_keeps_its_earlier_recording() {
 #[test]
 fn what_others_write_while_room_is_reserved_is_kept() {
     let place = workplace("0");
-    if !Command::new("strace").arg("-V").stdout(Stdio::null()).bounded_status().is_ok_and(|end| end.success())
-    {
-        eprintln!("skipped: there is no strace");
-        return;
-    }
     let earlier = place.write("out.csv", "earlier");
     let blocks = || std::os::unix::fs::MetadataExt::blocks(&earlier.metadata().expect("there"));
     for others in ["others' and longer", "others'"] {
         std::fs::write(&earlier, "earlier").expect("room");
         let before = blocks();
-        let program = place.phantom3();
-        let mut strace = place.prepare(Command::new("strace"));
-        strace.args(["-f", "-qq", "-o", "/dev/null", "-e", "trace=fallocate", "-e"]);
-        strace.arg("inject=fallocate:delay_exit=1500000").arg("-P").arg(&earlier);
-        strace.arg(program.get_program()).args(["run", "scene.toml", "--clock", "virtual", "--headless"]);
-        strace.args(["--seconds", "0.1", "--record", "out.csv"]);
+        let inject = "inject=fallocate:delay_exit=1500000";
+        let Some(strace) =
+            traced(&place, &["-e", "trace=fallocate", "-e", inject, "-P", "out.csv"], &RECORDS)
+        else {
+            return;
+        };
         let run = Running::start(strace);
         patience::until("room", || blocks() > before);
         std::fs::write(&earlier, others).expect("room");
@@ -184,6 +189,39 @@ fn what_others_write_while_room_is_reserved_is_kept() {
         assert!(said.err.contains("others have written to it"), "{}", said.err);
         assert_eq!(std::fs::read_to_string(&earlier).expect("there"), others);
     }
+}
+
+/// The calls that make a file of a name with this in it.
+fn makings(place: &Workplace, name: &str) -> Vec<String> {
+    let trace = std::fs::read_to_string(place.path("trace")).expect("a trace");
+    let is_one = |line: &&str| line.contains(name) && line.contains("O_CREAT");
+    trace.lines().filter(is_one).map(str::to_owned).collect()
+}
+
+/// Whoever opens it before it has the rights of the earlier table reads what is written later.
+#[test]
+fn the_draft_of_a_table_that_is_replaced_is_its_owners_alone_from_the_start() {
+    let place = workplace("4");
+    place.write("out.csv", "earlier");
+    let Some(strace) = traced(&place, &["-e", "trace=openat"], &["export", "r.mcap", "out.csv"]) else {
+        return;
+    };
+    assert_eq!(Running::start(strace).wait().status, Some(0));
+    let made = makings(&place, ".part");
+    assert!(made.len() == 1 && made[0].contains(", 0600)"), "{made:?}");
+}
+
+/// In a directory of all the system does not follow a link of others, which we would.
+#[test]
+fn a_link_that_leads_to_no_file_is_followed_by_the_system_alone() {
+    let place = workplace("0");
+    std::os::unix::fs::symlink("elsewhere.csv", place.path("out.csv")).expect("a link");
+    let Some(strace) = traced(&place, &["-e", "trace=openat"], &RECORDS) else { return };
+    let said = Running::start(strace).wait();
+    assert_eq!(said.status, Some(0), "{}", said.err);
+    assert!(!Table::read(&place.path("elsewhere.csv")).is_empty());
+    let (through, around) = (makings(&place, "out.csv"), makings(&place, "elsewhere.csv"));
+    assert!(!through.is_empty() && around.is_empty(), "{through:?} {around:?}");
 }
 
 /// The pipe holds the export up until a run records into a new file of the name.
