@@ -77,9 +77,11 @@ mod tests {
         let directory = tempfile::tempdir().expect("a directory");
         let [listens, two_lines, datagram] =
             ["s", "t\n0: 2 0 10000 1 1 7 x.7", "d"].map(|name| directory.path().join(name));
-        let _listening = [&listens, &two_lines].map(|path| UnixListener::bind(path).expect("a socket"));
-        let _others = UnixDatagram::bind(&datagram).expect("a socket");
+        let listening_there = [&listens, &two_lines].map(|path| UnixListener::bind(path).expect("a socket"));
+        let _other = UnixDatagram::bind(&datagram).expect("a socket");
+        // A connection that was taken has the name, too.
         let _connected = UnixStream::connect(&listens).expect("it listens");
+        let _taken = listening_there[0].accept().expect("a connection");
         let names = listening(std::process::id(), || true).expect("our own");
         let own: Vec<_> = names.into_iter().filter(|name| name.starts_with(directory.path())).collect();
         assert!(own.len() == 2 && own.contains(&listens) && own.contains(&two_lines), "{own:?}");

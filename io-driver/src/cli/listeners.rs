@@ -367,6 +367,28 @@ mod tests {
         assert_eq!([found.at(&two_lines), found.at(&own)], [Some(us), None]);
     }
 
+    /// A socket goes on telling the number of the process that made it listen, when that has ended and another one has the number.
+    #[test]
+    fn a_socket_of_another_users_is_no_drivers_whatever_number_it_tells() {
+        if own_uid() != 0 {
+            println!("skipped: sockets of other users, which need root");
+            return;
+        }
+        let directory = tempfile::tempdir().expect("a directory");
+        let rights = std::os::unix::fs::PermissionsExt::from_mode(0o777);
+        std::fs::set_permissions(directory.path(), rights).expect("our own");
+        let socket = directory.path().join("s");
+        let bind = || {
+            let user = rustix::process::Uid::from_raw(1);
+            rustix::thread::set_thread_uid(user).expect("root may");
+            UnixListener::bind(&socket).expect("a socket")
+        };
+        let _listening = std::thread::scope(|scope| scope.spawn(bind).bounded_join()).expect("no panic");
+        let owner = Owner { user: Some(0), groups: Vec::new() };
+        let listener = Listener { pid: std::process::id(), owner, socket, there: There::Nobody };
+        assert_eq!(listener.looked_at().there, There::Other);
+    }
+
     #[test]
     fn a_table_that_there_is_no_time_to_read_ends_with_a_whole_line() {
         let reads = Cell::new(0);
