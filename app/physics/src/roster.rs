@@ -4,6 +4,7 @@
 //! does so in a ring of those that will wake together. No allocation after `new`.
 
 use crate::body::Body;
+use crate::sleep::Rest;
 
 /// What a body does in a tick.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -43,8 +44,7 @@ pub(crate) struct Roster {
     places: Box<[usize]>,
     /// Of each body that sleeps, the next in its ring.
     next: Box<[usize]>,
-    /// For how long each has rested (s).
-    pub(crate) rested_s: Box<[f64]>,
+    pub(crate) rests: Box<[Rest]>,
     /// What each has got that nobody has paid for (J).
     pub(crate) owed_j: Box<[f64]>,
 }
@@ -65,7 +65,7 @@ impl Roster {
             awake: (0..count).collect(),
             places: (0..count).collect(),
             next: (0..count).collect(),
-            rested_s: vec![0.0; count].into(),
+            rests: vec![Rest::default(); count].into(),
             owed_j: vec![0.0; count].into(),
         }
     }
@@ -92,7 +92,7 @@ impl Roster {
     /// Gives a body another standing; who begins to sleep does so alone.
     pub(crate) fn set(&mut self, body: usize, standing: Standing) {
         let was = std::mem::replace(&mut self.standings[body], standing);
-        self.rested_s[body] = 0.0;
+        self.rests[body] = Rest::default();
         if standing == Standing::Asleep {
             self.next[body] = body;
         }
@@ -129,7 +129,7 @@ impl Roster {
     /// Somebody else steps all of them.
     pub(crate) fn set_all_elsewhere(&mut self) {
         self.standings.fill(Standing::Elsewhere);
-        self.rested_s.fill(0.0);
+        self.rests.fill(Rest::default());
         self.awake.clear();
     }
 

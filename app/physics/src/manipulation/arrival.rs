@@ -59,7 +59,7 @@ impl Manipulation {
         // What moved in the last tick drags friction along in this one.
         entities[self.roster.entities[body]].previous_X_WB = leaver.previous_X_WB;
         self.roster.set(body, Standing::Coming);
-        (self.roster.rested_s[body], self.roster.owed_j[body]) = (leaver.rested_s, leaver.owed_j);
+        (self.roster.rests[body], self.roster.owed_j[body]) = (leaver.rest, leaver.owed_j);
         let will_be = if leaver.is_asleep { Standing::Asleep } else { Standing::Awake };
         self.arrival.bodies.push((leaver.body, will_be));
     }

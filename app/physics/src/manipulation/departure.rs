@@ -95,7 +95,7 @@ impl Manipulation {
         Some(Content::Body(Leaver {
             body,
             is_asleep,
-            rested_s: self.roster.rested_s[at],
+            rest: self.roster.rests[at],
             owed_j: self.roster.owed_j[at],
             state: self.roster.bodies[at],
             previous_X_WB: entities[self.roster.entities[at]].previous_X_WB,

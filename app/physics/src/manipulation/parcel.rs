@@ -6,6 +6,7 @@ use crate::anchor::Anchor;
 use crate::body::Body;
 use crate::collide::Patch;
 use crate::pair::{ANCHORS_AT_ONCE, Head};
+use crate::sleep::Rest;
 
 /// A piece of an island on its way.
 #[derive(Debug, Clone, Copy)]
@@ -41,7 +42,7 @@ pub(super) enum Content {
 pub(super) struct Leaver {
     pub(super) body: u32,
     pub(super) is_asleep: bool,
-    pub(super) rested_s: f64,
+    pub(super) rest: Rest,
     pub(super) owed_j: f64,
     pub(super) state: Body,
     pub(super) previous_X_WB: Isometry3<f64>,

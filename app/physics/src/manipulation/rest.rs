@@ -5,6 +5,7 @@ use haptics::Entity;
 use super::{Manipulation, moving, who};
 use crate::pair;
 use crate::roster::Standing;
+use crate::sleep::Rest;
 use crate::touch::Touch;
 
 /// Who may sleep is looked for once in so many ticks.
@@ -59,16 +60,18 @@ impl Manipulation {
         let Some(sleep) = self.settings.sleep else { return };
         for place in 0..self.roster.awake().len() {
             let body = self.roster.awake()[place];
-            let rests = sleep.is_rest(&moving(&self.roster.bodies[body])) && !self.hand.is_tied_to(body);
-            let rested_s = &mut self.roster.rested_s[body];
-            *rested_s = if rests { *rested_s + dt_s } else { 0.0 };
+            let rest = &mut self.roster.rests[body];
+            rest.go_on(&moving(&self.roster.bodies[body]), &sleep, dt_s);
+            if self.hand.is_tied_to(body) {
+                *rest = Rest::default();
+            }
         }
         for touch in touches {
             if let Some(body) = self.body_of(touch.entity) {
-                self.roster.rested_s[body] = 0.0;
+                self.roster.rests[body] = Rest::default();
             }
         }
-        let is_tired = |body: &usize| self.roster.rested_s[*body] >= sleep.after_s;
+        let is_tired = |body: &usize| self.roster.rests[*body].lasts_s >= sleep.after_s;
         if self.ticks.is_multiple_of(TICKS_TO_SLEEP) && self.roster.awake().iter().any(is_tired) {
             self.put_islands_to_sleep(entities, sleep.after_s);
         }
@@ -90,7 +93,7 @@ impl Manipulation {
         // Of each set, the least that any of it has rested; it stands at the first.
         let least_s = &mut self.speeds_m_s;
         least_s.clear();
-        least_s.extend(awake.iter().map(|&body| self.roster.rested_s[body]));
+        least_s.extend(awake.iter().map(|&body| self.roster.rests[body].lasts_s));
         for place in 0..awake.len() {
             let first = self.sets.first(place);
             least_s[first] = least_s[first].min(least_s[place]);

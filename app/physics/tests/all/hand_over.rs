@@ -204,9 +204,9 @@ fn an_island_that_sleeps_goes_on_sleeping_and_wakes_as_one() {
         other.manipulation.step(&mut other.entities, &mut [], DT);
     }
     for (entity, before) in other.entities.iter().zip(before).take(4) {
-        // 1e-6 m/s when it fell asleep, decaying within a tenth of a second.
+        // It went half a micrometre at most in its last half second, and goes on ever slower.
         let moved = (entity.X_WB.translation.vector - before.translation.vector).norm();
-        assert!(moved < 1e-7, "{moved:e}");
+        assert!(moved < 5e-7, "{moved:e}");
     }
 }
 

@@ -8,7 +8,7 @@ use crate::thrown::{KINDS, shape};
 use common::{G, body, object};
 use haptics::{Capsule, Cuboid, Cylinder, Entity, Plane, Shape, Sphere};
 use nalgebra::{Isometry3, UnitQuaternion, Vector3};
-use physics::{Body, ContactStiffness, Manipulation, Settings, Sleep, Standing};
+use physics::{Body, ContactStiffness, Manipulation, Settings, Sleep};
 
 const R: f64 = 0.02;
 const MASS: f64 = 0.1;
@@ -199,47 +199,59 @@ fn a_box_does_not_know_of_it() {
     }
 }
 
-/// Things of all shapes are let fall into a box, in a heap.
+/// For how long things of all shapes move that are let fall into a box, in a heap, six seconds at most.
+///
+/// Nothing is faster than 0.1 mm/s then.
+fn heap_moves_s(count: usize, seed: u64) -> f64 {
+    const WALL_M: f64 = 0.12;
+    let noise = &mut Noise::new(seed);
+    let with = |entity: Entity| entity.with_turning_friction(2e-4, 2e-4).unwrap();
+    let plane = |normal: Vector3<f64>, offset_m: f64| {
+        let plane = Plane::new(normal, offset_m).unwrap();
+        with(object(plane, Isometry3::identity(), 1000.0, 0.5))
+    };
+    let mut entities = vec![plane(Vector3::y(), 0.0)];
+    let walls = [Vector3::x(), -Vector3::x(), Vector3::z(), -Vector3::z()];
+    entities.extend(walls.map(|normal| plane(normal, -WALL_M)));
+    let mut bodies = Vec::new();
+    for place in 0..count {
+        let shape = shape(KINDS[noise.below(KINDS.len())], noise);
+        let [x, y, z] = [place % 3, place / 9, place / 3 % 3].map(|at| 0.06 * at as f64);
+        let at = Vector3::new(x - 0.06, y + 0.06, z - 0.06);
+        let X_WB = Isometry3::from_parts(at.into(), noise.turn());
+        let entity = with(object(shape, X_WB, 1000.0, 0.5));
+        bodies.push((entities.len(), body(&entity, noise.log_within(0.01, 0.2))));
+        entities.push(entity);
+    }
+    let contact_stiffness = ContactStiffness::ByMass { damping_ratio: 1.0 };
+    let settings = Settings { contact_stiffness, sleep: Some(Sleep::default()), ..Settings::default() };
+    let mut manipulation = Manipulation::new(&entities, &bodies, settings).unwrap();
+    let mut ticks = 0;
+    while ticks < 6000 && !manipulation.awake().is_empty() {
+        manipulation.step(&mut entities, &mut [], 1e-3);
+        ticks += 1;
+    }
+    let speeds = manipulation.bodies().iter().map(|body| body.velocity_W.norm());
+    let fastest = speeds.fold(0.0, f64::max);
+    assert!(fastest < 1e-4, "{count} ({seed}): {fastest} m/s");
+    1e-3 * f64::from(ticks)
+}
+
 #[test]
 fn piles_of_mixed_shapes_come_to_rest_within_five_seconds() {
-    const WALL_M: f64 = 0.12;
-    let mut asleep = 0;
     for count in [18, 24, 30, 36] {
-        let noise = &mut Noise::new(count as u64);
-        let with = |entity: Entity| entity.with_turning_friction(2e-4, 2e-4).unwrap();
-        let plane = |normal: Vector3<f64>, offset_m: f64| {
-            let plane = Plane::new(normal, offset_m).unwrap();
-            with(object(plane, Isometry3::identity(), 1000.0, 0.5))
-        };
-        let mut entities = vec![plane(Vector3::y(), 0.0)];
-        let walls = [Vector3::x(), -Vector3::x(), Vector3::z(), -Vector3::z()];
-        entities.extend(walls.map(|normal| plane(normal, -WALL_M)));
-        let mut bodies = Vec::new();
-        for place in 0..count {
-            let shape = shape(KINDS[noise.below(KINDS.len())], noise);
-            let [x, y, z] = [place % 3, place / 9, place / 3 % 3].map(|at| 0.06 * at as f64);
-            let at = Vector3::new(x - 0.06, y + 0.06, z - 0.06);
-            let X_WB = Isometry3::from_parts(at.into(), noise.turn());
-            let entity = with(object(shape, X_WB, 1000.0, 0.5));
-            bodies.push((entities.len(), body(&entity, noise.log_within(0.01, 0.2))));
-            entities.push(entity);
-        }
-        let contact_stiffness = ContactStiffness::ByMass { damping_ratio: 1.0 };
-        let settings = Settings { contact_stiffness, sleep: Some(Sleep::default()), ..Settings::default() };
-        let mut manipulation = Manipulation::new(&entities, &bodies, settings).unwrap();
-        let is_asleep = |manipulation: &Manipulation| {
-            (0..count).all(|body| manipulation.standing(body) == Standing::Asleep)
-        };
-        for _ in 0..5000 {
-            if is_asleep(&manipulation) {
-                break;
-            }
-            manipulation.step(&mut entities, &mut [], 1e-3);
-        }
-        asleep += usize::from(is_asleep(&manipulation));
-        let speeds = manipulation.bodies().iter().map(|body| body.velocity_W.norm());
-        let fastest = speeds.fold(0.0, f64::max);
-        assert!(fastest < 1e-4, "{count}: {fastest} m/s");
+        let moves_s = heap_moves_s(count, count as u64);
+        assert!(moves_s < 5.0, "{count}: {moves_s} s");
     }
-    assert_eq!(asleep, 4);
+}
+
+#[test]
+#[ignore = "a minute on two CPUs"]
+fn of_48_piles_of_mixed_shapes_at_least_45_come_to_rest_within_five_seconds() {
+    let mut at_rest = 0;
+    for count in [18, 24, 30, 36] {
+        at_rest += (0..12).filter(|k| heap_moves_s(count, count as u64 + 100 * k) < 5.0).count();
+    }
+    // One that leans may take longer; which one, rounding decides.
+    assert!(at_rest >= 45, "{at_rest}");
 }
