@@ -25,8 +25,8 @@ use crate::solver::Motion;
 pub(crate) use crossing::{ANCHORS_AT_ONCE, Head};
 use ledger::{Allowed, Ledger, MAX_SPRINGS, SPRINGS_OF_POINT, Stretched};
 pub(crate) use pressed::HARD;
-pub(crate) use pressed::let_out_m_s;
 use pressed::row;
+pub(crate) use pressed::{LET_OUT_M_S, let_out_m_s};
 pub use surfacing::{Response, Surfacing};
 
 /// A pair and its contact points.
@@ -139,7 +139,8 @@ impl Pair {
         contact_points(in_A, in_B, reach_m, &mut self.memory, &mut found);
         let poses = [[&a.X_WB, &b.X_WB], [&a.previous_X_WB, &b.previous_X_WB]];
         let begins = self.count == 0;
-        self.carry(&found, poses, reach_m, speed_m_s * start.dt_s, last);
+        let deep_m = reach_m.min(self.surfacing.deepest_rest_m());
+        self.carry(&found, poses, deep_m, speed_m_s * start.dt_s, last);
         let pressed = self.anchors[..self.count].iter().filter(|anchor| anchor.is_pressed()).count();
         let resists_turning = (1..=turning::MOST_POINTS).contains(&pressed);
         if !resists_turning {
@@ -175,10 +176,17 @@ impl Pair {
         let has_springs = self.surfacing.response.has_springs();
         let mut springs = [Stretched::default(); MAX_SPRINGS];
         let (mut full, mut is_let_out) = (0.0, false);
+        let pushing_m = self.pushing_m(start);
         for (at, (anchor, point)) in self.anchors.iter_mut().zip(points).enumerate() {
             let depth_m = point.depth_m();
             let let_out_m = let_out_m_s(anchor.granted_m, start.dt_s) * start.dt_s;
             anchor.granted_m = (anchor.granted_m - let_out_m).clamp(0.0, depth_m);
+            if self.ledger.lets_out() {
+                // The account would pay for any depth: beyond what was worked springs lengthen slowly, and not far.
+                let worked_m = anchor.worked_m();
+                let pressed_m = worked_m.max((worked_m + let_out_m).min(pushing_m));
+                anchor.granted_m = anchor.granted_m.max(depth_m - pressed_m);
+            }
             is_let_out |= anchor.granted_m > 0.0;
             anchor.pressed_m = if point.gap_m < 0.0 { depth_m - anchor.granted_m } else { -point.gap_m };
             anchor.share = point.share;
@@ -196,7 +204,7 @@ impl Pair {
         let full_j = 0.5 * k * full;
         // Whoever is found deep later was not placed there: nobody has paid for that, or will be paid.
         if begins && self.ledger.is_closed() && self.is_new {
-            self.ledger = Ledger::of(full_j);
+            self.ledger = Ledger::of(full_j, is_let_out);
         }
         self.ledger.cut(full_j, is_let_out);
         let springs = &springs[..SPRINGS_OF_POINT * points.len().min(MAX_POINTS)];
@@ -213,6 +221,15 @@ impl Pair {
                 anchor.turn_back((allowed.of(&springs[2]) / springs[2].found).sqrt().min(1.0));
             }
         }
+    }
+
+    /// How far springs are pressed at most that let something out \[m\]: it is no faster then when they throw it, and the
+    /// heaviest rests less deep.
+    fn pushing_m(&self, start: &Start<'_>) -> f64 {
+        let (a, b) = self.bodies;
+        let per_kg = start.motions[a].inverse_mass + b.map_or(0.0, |b| start.motions[b].inverse_mass);
+        let thrown_m = LET_OUT_M_S / (self.surfacing.stiffness_n_per_m * per_kg).sqrt();
+        thrown_m.max(self.surfacing.deepest_rest_m().min(REACH_M))
     }
 
     /// Somebody has put one of them where it is: what they held is gone, what they hold there is theirs.
@@ -324,7 +341,7 @@ impl Pair {
         &mut self,
         found: &ContactPoints,
         [now, last]: [[&Isometry3<f64>; 2]; 2],
-        reach_m: f64,
+        deep_m: f64,
         moved_m: f64,
         last_anchors: &mut [Anchor; MAX_POINTS],
     ) {
@@ -356,10 +373,7 @@ impl Pair {
                 continue;
             }
             self.anchors[at] = Anchor::begin(point, now[0], now[1]);
-            if begins
-                && self.ledger.is_closed()
-                && -point.gap_m > reach_m.min(self.surfacing.deepest_rest_m())
-            {
+            if begins && self.ledger.is_closed() && point.depth_m() > deep_m {
                 self.anchors[at].granted_m = point.depth_m();
             }
         }

@@ -51,6 +51,7 @@ pub(super) struct Ledger {
     most_j: f64,
     /// Whether there is something that has not been paid for.
     owes: bool,
+    lets_out: bool,
 }
 
 /// Squares of how far springs are stretched \[m^2\]: as geometry has it, and as the work has it.
@@ -95,9 +96,14 @@ impl Ledger {
         self.held_j
     }
 
-    /// Springs that begin with all that they hold at their full length \[J\].
-    pub(super) fn of(full_j: f64) -> Self {
-        Self { held_j: full_j, ..Self::default() }
+    /// Springs that begin with all that they hold at their full length \[J\], and whether they get it slowly.
+    pub(super) fn of(full_j: f64, lets_out: bool) -> Self {
+        Self { held_j: full_j, lets_out, ..Self::default() }
+    }
+
+    /// Whether it holds more than anything has pressed: what was there from the start, and is let out.
+    pub(super) fn lets_out(&self) -> bool {
+        self.lets_out
     }
 
     /// Whether nothing was pressed when it was last seen: a contact that is lost while it is pressed may come back.
@@ -136,6 +142,7 @@ impl Ledger {
             Allowed::Only((1.0 + left / sure).max(0.0))
         };
         self.owes = is_let_out || allowed != Allowed::Everything;
+        self.lets_out &= self.owes;
         allowed
     }
 }
@@ -190,7 +197,7 @@ mod tests {
         let full_j: f64 = springs.iter().map(|spring| 0.5 * K * spring.found).sum();
         let sure_j: f64 = springs.iter().map(|spring| 0.5 * K * spring.found.min(spring.worked)).sum();
         for held_j in [0.0, 0.5 * sure_j, sure_j, 0.5 * (sure_j + full_j), full_j, 2.0 * full_j] {
-            let mut ledger = Ledger::of(held_j);
+            let mut ledger = Ledger::of(held_j, false);
             let allowed = ledger.allow(&springs, K, false);
             // Roundings of a few squares.
             let expected_j = held_j.min(full_j);
@@ -207,7 +214,7 @@ mod tests {
     #[test]
     fn what_is_owed_presses_with_nothing_and_is_paid_back_first() {
         let springs = [spring(2e-3, 1e-3)];
-        let mut ledger = Ledger::of(-1e-3);
+        let mut ledger = Ledger::of(-1e-3, false);
         assert_eq!(holds_j(ledger.allow(&springs, K, false), &springs), 0.0);
         ledger.refund(2e-3);
         let allowed = ledger.allow(&springs, K, false);
@@ -216,7 +223,7 @@ mod tests {
 
     #[test]
     fn an_account_pays_what_it_has_and_hands_on_what_it_has_not() {
-        let mut ledger = Ledger::of(3.0);
+        let mut ledger = Ledger::of(3.0, false);
         assert_eq!(ledger.pay(1.0), 0.0);
         assert_eq!((ledger.pay(5.0), ledger.held_j()), (3.0, 0.0));
         ledger.enter(2.0);
@@ -228,7 +235,7 @@ mod tests {
 
     #[test]
     fn what_is_taken_while_springs_are_short_is_kept_as_long_as_something_is_not_paid_for() {
-        let mut ledger = Ledger::of(1.0);
+        let mut ledger = Ledger::of(1.0, false);
         ledger.cut(1.0, true);
         ledger.cut(0.2, true);
         assert_eq!(ledger.held_j(), 1.0);

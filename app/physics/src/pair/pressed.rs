@@ -109,7 +109,7 @@ pub(crate) fn let_out_m_s(depth_m: f64, dt_s: f64) -> f64 {
 /// for depths up to `g t^2`, 0.1 m: it follows, and does not hop.
 const LET_OUT_S: f64 = 0.1;
 /// And never faster than this \[m/s\].
-const LET_OUT_M_S: f64 = 0.2;
+pub(crate) const LET_OUT_M_S: f64 = 0.2;
 /// How many times harder than what moves impulses stop: velocities are right to one part in so many, and solved for with as
 /// many times the rounding.
 pub(crate) const HARD: f64 = 1e6;

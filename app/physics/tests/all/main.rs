@@ -42,6 +42,7 @@ mod held_objects;
 mod impulse;
 mod islands;
 mod ledger;
+mod let_out;
 mod limit_surface;
 mod meshes_floor;
 mod meshes_mass;

@@ -1,0 +1,52 @@
+//! What overlaps is let out slowly, whatever it is, however deep, and also where another way out becomes the shortest one.
+#![allow(non_snake_case)]
+
+use crate::common;
+use crate::noise::Noise;
+use crate::thrown::{KINDS, shape};
+
+use common::*;
+use haptics::Entity;
+use nalgebra::{Isometry3, Vector3};
+use physics::{Body, ContactStiffness, Settings};
+
+/// The fastest that either of two gets that are placed into each other (m/s), and after which time none of their springs
+/// presses any more (s). The second has this share of the first one's mass.
+fn let_out(noise: &mut Noise, contact_stiffness: ContactStiffness, share: f64) -> [f64; 2] {
+    let [one, other] = [0; 2].map(|_| shape(KINDS[noise.below(KINDS.len())], noise));
+    let entities: Vec<Entity> = [(one, Vector3::zeros()), (other, noise.vector(0.02))]
+        .map(|(shape, at_W)| object(shape, Isometry3::from_parts(at_W.into(), noise.turn()), 1000.0, 0.5))
+        .into();
+    let bodies: Vec<(usize, Body)> =
+        [1.0, share].iter().enumerate().map(|(at, share)| (at, body(&entities[at], 0.1 * share))).collect();
+    let settings = Settings { gravity_W: Vector3::zeros(), contact_stiffness, ..Settings::default() };
+    let mut world = World::new(entities, &bodies, settings, 0);
+    let [mut fastest_m_s, mut pressed_s] = [0.0_f64; 2];
+    for tick in 0..3000 {
+        world.step(&[]);
+        let speeds = world.manipulation.bodies().iter().map(|body| body.velocity_W.norm());
+        fastest_m_s = speeds.fold(fastest_m_s, f64::max);
+        if world.manipulation.rows().iter().any(|row| row.force_W != Vector3::zeros()) {
+            pressed_s = DT * f64::from(tick);
+        }
+    }
+    [fastest_m_s, pressed_s]
+}
+
+#[test]
+fn what_is_placed_into_each_other_comes_out_slowly() {
+    let by_mass = ContactStiffness::ByMass { damping_ratio: 1.0 };
+    for (name, contact_stiffness) in [("by mass", by_mass), ("as felt", ContactStiffness::AsFelt)] {
+        for share in [1.0, 0.01] {
+            let mut free = 0;
+            for seed in 0..100 {
+                let [fastest_m_s, pressed_s] = let_out(&mut Noise::new(seed), contact_stiffness, share);
+                // Depths fall by 0.2 m/s at most; at the end of an arm what turns out of another is a little faster.
+                assert!(fastest_m_s < 0.35, "{name}, {share}, {seed}: {fastest_m_s} m/s");
+                free += usize::from(pressed_s < 2.0);
+            }
+            // Rings about bars have no way out.
+            assert!(free > 85, "{name}, {share}: {free}");
+        }
+    }
+}
