@@ -33,6 +33,7 @@ mod crossing;
 mod crowded;
 pub(crate) mod draw;
 mod error;
+mod extremes;
 mod face;
 mod facing;
 mod fan;
@@ -80,8 +81,10 @@ pub use soup::TriangleSoup;
 pub use uv::CornerUv;
 pub use walk::MAX_FEATURE_CHANGES;
 
+use extremes::Extremes;
 use nalgebra::Vector3;
 use std::fmt;
+use std::sync::OnceLock;
 use uv::FaceUv;
 
 /// The most faces around a vertex: a walk goes round it within a tick.
@@ -102,6 +105,8 @@ pub struct Mesh {
     uv: Option<Box<[FaceUv]>>,
     /// The label of each face, where somebody gave any.
     labels: Option<Box<[u16]>>,
+    /// What lies farthest out, if somebody has asked for it.
+    extremes: OnceLock<Extremes>,
 }
 
 /// From where a mesh, or a part of it that hangs together by edges, can be felt.

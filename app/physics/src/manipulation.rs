@@ -22,7 +22,7 @@ pub use parcel::Parcel;
 use arrival::Arrival;
 use departure::Departure;
 use driven::Driven;
-use haptics::Entity;
+use haptics::{Entity, Shape};
 use nalgebra::Vector3;
 
 use crate::anchor::Anchor;
@@ -123,6 +123,11 @@ impl Manipulation {
     }
 
     fn of(entities: &[Entity], bodies: &[(usize, Body)], settings: Settings) -> Self {
+        for (entity, _) in bodies {
+            if let Shape::Mesh(mesh) = &entities[*entity].shape {
+                mesh.find_extremes();
+            }
+        }
         let count = bodies.len();
         let places = count + MAX_DRIVEN;
         let pairs = count.saturating_mul(entities.len()).min(MAX_PAIRS.max(PAIRS_OF_BODY * count));

@@ -18,6 +18,7 @@ use super::repair::area_vector;
 use super::{Bvh, CloseHoles, Face, Link, Mesh, MeshError, MeshReport, Sides, TriangleSoup};
 use super::{fold, hole, junction, order, pinch, repair, topology, winding};
 use nalgebra::Vector3;
+use std::sync::OnceLock;
 use std::sync::atomic::{AtomicU64, Ordering};
 
 /// A face is divided on one edge at a time.
@@ -103,8 +104,18 @@ impl Mesh {
         let vertices = vertices.into_boxed_slice();
         let bvh = Bvh::build(&faces, &vertices);
         let identity = BUILT.fetch_add(1, Ordering::Relaxed);
-        let mut mesh =
-            Self { faces, vertices, bvh, sides, has_inside, extent_m, identity, uv: None, labels: None };
+        let mut mesh = Self {
+            faces,
+            vertices,
+            bvh,
+            sides,
+            has_inside,
+            extent_m,
+            identity,
+            uv: None,
+            labels: None,
+            extremes: OnceLock::new(),
+        };
         report.crossed = mesh.mark_crossed();
         mesh.turn_outward(&parts, &mut report);
         let is_fitting;

@@ -174,8 +174,8 @@ impl Other<'_> {
         matches!(convex.core, Core::Ellipsoid { .. }).then(|| convex.support(&-up_M))
     }
 
-    /// A point that no other one of it passes in this direction; of a mesh, about where they meet.
-    pub(super) fn front(&self, way_M: &Vector3<f64>, meeting: &Meeting) -> Vector3<f64> {
+    /// A point that no other one of it passes in this direction, as far about where they meet as is asked; of a mesh, only there.
+    pub(super) fn front(&self, way_M: &Vector3<f64>, meeting: &Meeting, around_m: f64) -> Vector3<f64> {
         match self.solid {
             Solidity::Form(form @ Form::Torus(torus)) => {
                 let (centre_M, _) = self.ball();
@@ -183,8 +183,15 @@ impl Other<'_> {
                 let first = owns[0].map_or(centre_M, |own| own.at_M);
                 first + way_M * torus.tube_radius_m()
             }
-            Solidity::Form(form) => Convex::of(form, &self.X_MO)
-                .map_or(meeting.at_M, |convex| convex.support(way_M) + way_M * convex.radius_m),
+            Solidity::Form(form) => {
+                // The way is that of the last tick: a wide face seems to lean by what has turned since, and rises far away.
+                let Seen { out, gap_m } = self.see(&meeting.at_M, way_M, meeting.deep_m());
+                let near_M = meeting.at_M - out * gap_m;
+                let passes_m = Convex::of(form, &self.X_MO)
+                    .map_or(0.0, |convex| way_M.dot(&(convex.support(way_M) - near_M)) + convex.radius_m);
+                let leans = (way_M - out * out.dot(way_M)).norm();
+                near_M + way_M * passes_m.min(around_m * leans)
+            }
             Solidity::Mesh(_) => meeting.at_M + way_M * meeting.depth_m,
         }
     }

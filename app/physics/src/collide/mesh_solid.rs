@@ -178,7 +178,7 @@ impl Place<'_> {
     fn vertices(&mut self, stands: &mut super::Stands) {
         let (mesh, other, meeting) = (self.mesh, self.other, self.meeting);
         let n = meeting.normal_M;
-        let height = Linear::from(&other.front(&-n, &meeting), -n);
+        let height = Linear::from(&other.front(&-n, &meeting, mesh.extent_m()), -n);
         let several = self.patches.are_several();
         let reaches_m = |way: &Vector3<f64>| match several {
             true => other.reaches_m(way),

@@ -22,7 +22,7 @@
 //! already while the patch grows beyond them, to half a side of their polygon.
 //! Frames: the mesh's own. Cost: next to nothing while it rests; when it tilts or sinks, a walk and a query of the
 //! hierarchy for each role, both bounded. Of very many triangles in an oblique face a query may miss the best; so in each
-//! tick that of another role looks at more.
+//! tick that of another role looks at more, D's among them: a bump between others is no neighbour of theirs.
 
 use haptics::mesh::Linear;
 
@@ -157,18 +157,41 @@ impl Standing<'_> {
         let counts = |corner: &Corner| self.is_over(*corner) && self.height_m(*corner) <= self.reach_m;
         let lower = |a: Corner, b: Corner| if self.height_m(b) < self.height_m(a) { b } else { a };
         let mut kept = kept.iter().flatten().copied().filter(|corner| counts(corner) && !self.is_fast());
-        let Some(first) = kept.next() else {
-            let counts = [&self.below(self.reach_m), &Linear::ONE];
-            return self
-                .mesh
-                .outlying(counts, self.limits, 0.0, MANY_VISITS)
-                .map(|(corner, _)| Corner::new(corner));
-        };
+        let Some(first) = kept.next() else { return self.of_all(-self.reach_m, f64::INFINITY) };
         let known = kept.fold(first, lower);
         // What comes in loaded pushes: a ball that rolls would be driven by what enters below it and leaves behind.
-        let depth = |corner: Corner| if self.is_over(corner) { -self.height_m(corner) } else { f64::MIN };
+        let depth = |corner: Corner| self.depth_m(corner);
         let (lowest, depth_m) = known.climb(self.mesh, depth);
-        Some(if depth_m > DEEPER * depth(known) + LEAST_M { lowest } else { known })
+        let least_m = DEEPER * depth(known) + LEAST_M;
+        // Another limb that comes down is no neighbour. What is far behind the face is another side.
+        let most_m = least_m + 2.0 * self.travel_m + BEHIND_M;
+        Some(self.of_all(least_m.max(depth_m), most_m).unwrap_or(if depth_m > least_m {
+            lowest
+        } else {
+            known
+        }))
+    }
+
+    /// The one that lies deepest of all, if it is deeper than this and not deeper than that (m).
+    fn of_all(&self, than_m: f64, most_m: f64) -> Option<Corner> {
+        if let Some(farthest) = self.mesh.extreme(&-self.height.along_B) {
+            let (farthest, depth_m) = Corner::new(farthest).climb(self.mesh, |corner| self.depth_m(corner));
+            if depth_m > than_m && depth_m <= most_m {
+                return Some(farthest);
+            }
+        }
+        let mut limits = [Linear::new(self.height.along_B, self.height.base + most_m); MAX_LIMITS];
+        let given = self.limits.len().min(MAX_LIMITS - 1);
+        limits[1..=given].copy_from_slice(&self.limits[..given]);
+        let limits = if most_m.is_finite() { &limits[..=given] } else { self.limits };
+        let counts = [&self.below(self.reach_m), &Linear::ONE];
+        let found = self.mesh.outlying(counts, limits, self.reach_m + than_m, MANY_VISITS);
+        found.map(|(corner, _)| Corner::new(corner))
+    }
+
+    /// What is not over the face is not in it.
+    fn depth_m(&self, corner: Corner) -> f64 {
+        if self.is_over(corner) { -self.height_m(corner) } else { f64::MIN }
     }
 
     /// Below this height they count when a vertex of that height does \[m\].
@@ -199,5 +222,7 @@ const FIRST_TURNS: usize = 3;
 const STILL: f64 = 0.01;
 /// Depths below this are as this one \[m\].
 const LEAST_M: f64 = 1e-5;
+/// What is newly found is no deeper than what has come down in a tick, and this \[m\].
+const BEHIND_M: f64 = 1e-3;
 /// Limits of a face, and the level.
 const MAX_LIMITS: usize = 6;

@@ -267,8 +267,8 @@ fn round_meshes_that_are_put_down_stand_upright_and_rest_within_a_second() {
             table.run(1.0);
             let (body, axis) = (table.body(0), table.entities[1].X_WB.rotation * Vector3::z());
             let leans = axis.y.abs().min(1.0).acos();
-            // It rests 2.5 um deep on four corners or more, 30 mm apart at least: by so much one may be deeper than another.
-            assert!(leans < 2.5e-6 / 0.03, "{sides}, {rate_hz} Hz, {lean}: {leans} rad");
+            // It rests 3.3 um deep on three corners or more, 30 mm apart at least: by so much one may be deeper than another.
+            assert!(leans < 3.3e-6 / 0.03, "{sides}, {rate_hz} Hz, {lean}: {leans} rad");
             assert!(body.velocity_W.norm() < 1e-6, "{sides}, {rate_hz} Hz, {lean}: {}", body.velocity_W);
         }
     }

@@ -44,6 +44,7 @@ mod islands;
 mod ledger;
 mod let_out;
 mod limit_surface;
+mod meshes_bumps;
 mod meshes_floor;
 mod meshes_mass;
 mod meshes_oracle;
