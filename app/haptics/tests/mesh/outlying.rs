@@ -1,6 +1,7 @@
 //! Vertices that lie farthest out, against a search through all of them.
 
 use crate::common::Noise;
+use crate::common::meshes::unit_vector;
 use haptics::mesh::{Linear, Mesh, make};
 use nalgebra::Vector3;
 
@@ -82,17 +83,16 @@ fn too_much_to_look_at_is_said() {
 
 #[test]
 fn what_lies_farthest_out_is_told_to_a_hair_in_any_direction_once_it_was_sought() {
-    let noise = &mut Noise::new(5);
+    let mut noise = Noise(5);
     let soups = [make::bumpy_sphere(200, 100, 0.05), make::star(7, 0.05, 0.02, 0.01), make::cuboid([0.1; 3])];
     for (soup, off_m) in soups.into_iter().zip([1e-4, 0.0, 0.0]) {
         let mesh = Mesh::build(soup).unwrap().0;
         assert_eq!(mesh.extreme(&Vector3::x()), None, "nobody has asked for it");
         mesh.find_extremes();
         for _ in 0..1000 {
-            let along = noise.direction();
+            let along = unit_vector(&mut noise);
             let corner = mesh.extreme(&along).unwrap();
-            let vertex = mesh.faces()[(corner / 3) as usize].vertices[(corner % 3) as usize];
-            let far = along.dot(&mesh.vertices()[vertex as usize]);
+            let far = along.dot(&point(&mesh, corner));
             let farthest = mesh.vertices().iter().map(|vertex| along.dot(vertex)).fold(f64::MIN, f64::max);
             // Half a cell is 2.25 degrees: 50 mm by the square of that are 0.08 mm. Of few corners each has its cell.
             assert!(far >= farthest - off_m && far <= farthest, "{} m", farthest - far);
