@@ -100,6 +100,8 @@ pub struct Tally {
     pub moving: [usize; 2],
     /// Ticks in which there was more at a finger's place than it can feel at once.
     pub crowded: u64,
+    /// How often entities that were near each other, or points of theirs, had no room among what moves.
+    pub left_out: u64,
     /// How often a force was cut because nothing moved for it.
     pub cuts: u64,
     /// The most that was cut at once (N).
@@ -334,6 +336,7 @@ impl FastLoop {
         self.row.due_ns = self.frame.deadline_ns;
         self.tally.park(self.step.parked_now(), self.row.run_tick, self.is_first_scene);
         self.tally.crowded += u64::from(self.step.is_crowded());
+        self.tally.left_out = self.tally.left_out.max(self.step.left_out());
         for cut in self.step.cuts() {
             self.tally.cuts += 1;
             self.tally.most_cut_n = self.tally.most_cut_n.max(cut.force_n);

@@ -198,6 +198,11 @@ impl FastStep {
         self.near.iter().any(Near::is_crowded)
     }
 
+    /// How often contacts between entities had no room so far, in the fast list.
+    pub fn left_out(&self) -> u64 {
+        self.objects.left_out()
+    }
+
     /// What was cut from forces in the last tick, because nothing moved for it.
     pub fn cuts(&self) -> impl Iterator<Item = Cut> {
         let fingers = self.fingers.iter().zip(&self.lines).enumerate();

@@ -14,7 +14,7 @@ pub struct ListsEnd {
     pub handed: Handed,
     /// Ticks that the slow list did not make up for.
     pub late_ticks: u64,
-    /// Pairs of entities that came near each other and had no room.
+    /// Contacts of the slow list that had no room.
     pub left_out: u64,
 }
 
@@ -31,7 +31,7 @@ impl fmt::Display for ListsEnd {
         }
         for (count, what) in [
             (self.late_ticks, "ticks that the slow one was late"),
-            (self.left_out, "pairs left out"),
+            (self.left_out, "contacts of the slow one left out"),
             (unclaimed, "claims without room"),
         ] {
             if count > 0 {

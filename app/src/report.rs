@@ -112,6 +112,13 @@ impl fmt::Display for Report {
         if moving > 0 {
             writeln!(f, "objects      {moving}, {awake} of them awake in the last tick")?;
         }
+        if tally.left_out > 0 {
+            let left_out = tally.left_out;
+            writeln!(
+                f,
+                "left out     {left_out} times a contact between objects that had no room; they may go through each other"
+            )?;
+        }
         if tally.crowded > 0 {
             let crowded = tally.crowded;
             writeln!(

@@ -108,6 +108,18 @@ impl ContactPoints {
         }
     }
 
+    /// Without those that are farther apart than this \[m\].
+    pub(crate) fn forget_beyond(&mut self, gap_m: f64) {
+        let mut kept = 0;
+        for at in 0..self.count {
+            if self.points[at].gap_m <= gap_m {
+                self.points.swap(kept, at);
+                kept += 1;
+            }
+        }
+        self.count = kept;
+    }
+
     /// All of them.
     pub fn as_slice(&self) -> &[ContactPoint] {
         &self.points[..self.count]

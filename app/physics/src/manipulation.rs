@@ -95,13 +95,14 @@ pub struct Manipulation {
 
 /// The most touches of fingers in a tick.
 const MAX_TOUCHES: usize = 64;
-/// The most contact points between entities in a tick, or so many of each body if that is more; others are left out.
-const MAX_ROWS: usize = 2048;
+/// The most contact points between entities in a tick, or so many of each body if that is more; others are left out, and
+/// counted. A quarter is for those with what does not move: nothing falls through a floor for want of room.
+const MAX_ROWS: usize = 8192;
 const ROWS_OF_BODY: usize = 8;
 /// The box of a body is longer by the way of so many ticks than it need be.
 const TICKS_AHEAD: f64 = 16.0;
 /// The most pairs of entities that are near each other, or so many of each body if that is more; others are left out, and
-/// counted.
+/// counted, and a quarter is for those with what does not move.
 const MAX_PAIRS: usize = 4096;
 const PAIRS_OF_BODY: usize = 3;
 

@@ -56,6 +56,10 @@ pub(crate) struct Pair {
 /// What a tick's contact points are written to.
 pub(crate) struct Gathered<'t> {
     pub(crate) rows: &'t mut Vec<Row>,
+    /// The most rows that there may be then.
+    pub(crate) most_rows: usize,
+    /// Points that had no room.
+    pub(crate) left_out: &'t mut u64,
     /// Those that may meet what they touch.
     pub(crate) meetings: &'t mut Vec<Meeting>,
     /// Room for a pair's anchors of the last tick.
@@ -122,7 +126,7 @@ impl Pair {
     /// Finds where it touches, and appends a row for each point; notes those that may meet what they touch. Says whether the
     /// two are near enough to touch.
     pub(crate) fn gather(&mut self, start: &Start<'_>, gathered: &mut Gathered<'_>) -> bool {
-        let Gathered { rows, meetings, last } = gathered;
+        let Gathered { rows, most_rows, left_out, meetings, last } = gathered;
         (self.first_row, self.rows) = (rows.len(), 0);
         let [a, b] = self.entities.map(|index| &start.entities[index]);
         let speed_m_s = self.closing_speed(start);
@@ -137,6 +141,10 @@ impl Pair {
         let (in_A, in_B) = (Solid { shape: &a.shape, X_W: &a.X_WB }, Solid { shape: &b.shape, X_W: &b.X_WB });
         let mut found = ContactPoints::default();
         contact_points(in_A, in_B, reach_m, &mut self.memory, &mut found);
+        if rows.len() > *most_rows / 2 {
+            // Where room is scarce it is for what may touch in this tick.
+            found.forget_beyond(speed_m_s * start.dt_s);
+        }
         let poses = [[&a.X_WB, &b.X_WB], [&a.previous_X_WB, &b.previous_X_WB]];
         let begins = self.count == 0;
         let deep_m = reach_m.min(self.surfacing.deepest_rest_m());
@@ -152,8 +160,9 @@ impl Pair {
         }
         self.is_new = false;
         for (anchor, point) in self.anchors.iter_mut().zip(found.as_slice()) {
-            if rows.len() == rows.capacity() {
-                break;
+            if rows.len() >= *most_rows {
+                **left_out += 1;
+                continue;
             }
             let (mut row, stop_n_s_per_m) = row(self.bodies, &self.surfacing, anchor, point, &b.X_WB, start);
             if resists_turning {

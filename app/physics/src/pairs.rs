@@ -171,7 +171,8 @@ impl Pairs {
         if at(&self.asleep).is_ok() {
             return;
         }
-        let Some(place) = self.unused.pop() else {
+        let is_full = other.is_some() && self.unused.len() <= self.pool.len() / 4;
+        let Some(place) = self.unused.pop_if(|_| !is_full) else {
             self.left_out += 1;
             return;
         };

@@ -151,14 +151,18 @@ impl Objects {
         let late_ticks = slow.as_ref().map_or(0, |slow| slow.late_ticks);
         lists.slow = lists.slow.take().or(slow.map(|slow| slow.slow));
         lists.hand_over.end(&mut self.manipulation, entities, lists.slow.as_mut());
-        let of_slow = lists.slow.as_ref().map_or(0, |slow| slow.manipulation().left_out());
         Some(ListsEnd {
             fast: lists.hand_over.here(),
             slow: lists.slow.as_ref().map(SlowList::here),
             handed: lists.hand_over.handed(),
             late_ticks,
-            left_out: self.manipulation.left_out() + of_slow,
+            left_out: lists.slow.as_ref().map_or(0, |slow| slow.manipulation().left_out()),
         })
+    }
+
+    /// How often contacts of the fast list had no room.
+    pub fn left_out(&self) -> u64 {
+        self.manipulation.left_out()
     }
 
     /// How many bodies are in the fast list, and what has been handed over.

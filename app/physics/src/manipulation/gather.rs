@@ -72,6 +72,9 @@ impl Manipulation {
         let pull_rows = self.gather_pulls(pulls, dt_s);
         self.touching = self.rows.len();
         self.restitution.meetings.clear();
+        let mut left_out = 0;
+        let room = self.rows.capacity() - self.rows.len();
+        let [most_rows, of_bodies] = [room, room - room / 4].map(|room| self.rows.len() + room);
         for at in 0..self.pairs.awake_count() {
             let (key, _) = self.pairs.awake_at(at);
             let other = self.roster.place_of_entity(key.entity as usize);
@@ -101,16 +104,20 @@ impl Manipulation {
                 is_implicit: self.settings.integrator.is_implicit(),
             };
             pair.bodies = (first, other);
+            let is_with_body = self.roster.numbers[key.entity as usize].is_some();
             let is_near = pair.gather(
                 &start,
                 &mut Gathered {
                     rows: &mut self.rows,
+                    most_rows: if is_with_body { of_bodies } else { most_rows },
+                    left_out: &mut left_out,
                     meetings: &mut self.restitution.meetings,
                     last: &mut self.last_anchors,
                 },
             );
             self.pairs.set_near(at, is_near);
         }
+        self.pairs.left_out += left_out;
         (touch_rows, pull_rows)
     }
 

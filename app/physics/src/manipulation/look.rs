@@ -34,7 +34,7 @@ impl Manipulation {
         &self.changed
     }
 
-    /// How many pairs of entities that are near each other were left out for want of room, each time they came near.
+    /// How often pairs of entities that are near each other, or contact points, were left out for want of room.
     pub fn left_out(&self) -> u64 {
         self.pairs.left_out
     }

@@ -22,6 +22,7 @@ mod ball_grasp;
 mod broad_phase;
 mod contact_stiffness;
 mod cradle;
+mod dense;
 mod driven;
 mod energy;
 mod energy_impulse;
