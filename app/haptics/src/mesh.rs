@@ -99,6 +99,7 @@ pub struct Mesh {
     /// Whether any part is closed.
     has_inside: bool,
     extent_m: f64,
+    longest_edge_m: f64,
     /// Of all meshes that this process has built, which. An address would be another mesh's as soon as this one is gone.
     identity: u64,
     /// Texture coordinates of each face's corners, where somebody gave any: 24 bytes a face beside its 64.
@@ -148,6 +149,11 @@ impl Mesh {
     /// Whether any of its parts is solid.
     pub fn has_inside(&self) -> bool {
         self.has_inside
+    }
+
+    /// Of all edges \[m\]: no point of an edge is farther than half of it from a vertex.
+    pub fn longest_edge_m(&self) -> f64 {
+        self.longest_edge_m
     }
 
     /// Largest coordinate, without its sign \[m\]: what rounding errors are measured by.

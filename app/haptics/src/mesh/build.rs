@@ -101,6 +101,11 @@ impl Mesh {
         report.faces = faces.len();
         report.vertices = vertices.len();
         let extent_m = vertices.iter().fold(0.0_f64, |extent, v| extent.max(v.amax()));
+        let edges_m = faces.iter().flat_map(|face| {
+            let [a, b, c] = face.vertices.map(|vertex| vertices[vertex as usize]);
+            [(a - b).norm(), (b - c).norm(), (c - a).norm()]
+        });
+        let longest_edge_m = edges_m.fold(0.0, f64::max);
         let vertices = vertices.into_boxed_slice();
         let bvh = Bvh::build(&faces, &vertices);
         let identity = BUILT.fetch_add(1, Ordering::Relaxed);
@@ -111,6 +116,7 @@ impl Mesh {
             sides,
             has_inside,
             extent_m,
+            longest_edge_m,
             identity,
             uv: None,
             labels: None,

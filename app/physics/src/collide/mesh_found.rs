@@ -94,7 +94,9 @@ impl Found {
             let deeper_m = one.gap_m - contact.gap_m;
             let is_aside = one.normal_M.dot(&contact.normal_M) < AGREES;
             let stays = contact.carried && !one.carried && is_aside && deeper_m > -together_m;
-            if there >= begin && (deeper_m > together_m || stays) {
+            // A corner that is beside a face by next to nothing takes no place from one that is on it.
+            let is_beside = is_aside && one.gap_m >= 0.0 && contact.gap_m < 0.0;
+            if there >= begin && (deeper_m > together_m || stays || is_beside) {
                 self.contacts[there] = contact;
             }
         } else if let Some(place) = self.contacts.get_mut(self.count) {

@@ -56,35 +56,53 @@ impl Meeting {
         1.5 * self.depth_m + 2.0 * self.travel_m + BEGUN_M
     }
 
-    /// The square across the normal that something covers, by how far it reaches in a direction: what is outside of it cannot
-    /// be touched.
-    pub(super) fn shadow(&self, reaches_m: impl Fn(&Vector3<f64>) -> f64) -> [Linear; 4] {
-        let u = super::mesh_role::across(&self.normal_M);
-        let v = self.normal_M.cross(&u);
-        [u, -u, v, -v].map(|way| Linear::new(-way, reaches_m(&way) + self.reach_m))
+    /// Sides of a box that stand about along the normal, so far out: what is outside of them cannot be touched.
+    fn shadow(&self, covers: &Extent, beside_m: f64) -> [Linear; 4] {
+        let mut sides = [0, 1, 2];
+        let stands = |axis: &usize| covers.axes_M[*axis].dot(&self.normal_M).abs();
+        sides.sort_unstable_by(|a, b| stands(a).total_cmp(&stands(b)));
+        let [u, v] = [sides[0], sides[1]];
+        [(u, 0), (u, 1), (v, 0), (v, 1)].map(|(axis, end)| {
+            let sign = if end == 0 { -1.0 } else { 1.0 };
+            Linear::new(
+                covers.axes_M[axis] * -sign,
+                sign * covers.ends_m[axis][end] + self.reach_m + beside_m,
+            )
+        })
     }
 
     /// With where a height begins that is no deeper than what may be pressed here, and not on another side \[m\].
     pub(super) fn limits(
         &self,
-        reaches_m: impl Fn(&Vector3<f64>) -> f64,
+        covers: &Extent,
+        beside_m: f64,
         height: &Linear,
         behind_m: f64,
     ) -> [Linear; 5] {
-        let [a, b, c, d] = self.shadow(reaches_m);
+        let [a, b, c, d] = self.shadow(covers, beside_m);
         let deepest_m = self.deep_m() + 2.0 * self.travel_m + behind_m;
         [a, b, c, d, Linear::new(height.along_B, height.base + deepest_m)]
     }
 }
 
-/// How far a ball reaches in a direction \[m\].
-pub(super) fn ball_reaches_m((centre_M, radius_m): (Vector3<f64>, f64), way_M: &Vector3<f64>) -> f64 {
-    way_M.dot(&centre_M) + radius_m
+/// The box along its own axes that something is in.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Extent {
+    axes_M: [Vector3<f64>; 3],
+    /// Of each, along it \[m\].
+    ends_m: [[f64; 2]; 3],
 }
 
-/// How far a box does \[m\].
-pub(super) fn box_reaches_m([low, high]: [Vector3<f64>; 2], way: &Vector3<f64>) -> f64 {
-    0.5 * (way.dot(&(low + high)) + way.abs().dot(&(high - low)))
+impl Extent {
+    /// Of a box in a frame that is placed in M.
+    pub(super) fn of([low, high]: [Vector3<f64>; 2], X_MO: &Isometry3<f64>) -> Self {
+        let axes_M = [Vector3::x(), Vector3::y(), Vector3::z()].map(|axis| X_MO.rotation * axis);
+        let ends_m = std::array::from_fn(|axis| {
+            let at_m = axes_M[axis].dot(&X_MO.translation.vector);
+            [low[axis] + at_m, high[axis] + at_m]
+        });
+        Self { axes_M, ends_m }
+    }
 }
 
 impl Other<'_> {
@@ -98,11 +116,26 @@ impl Other<'_> {
         ((self.X_MO * Point3::from(centre)).coords, radius_m)
     }
 
-    /// How far it reaches in a direction, about \[m\].
-    pub(super) fn reaches_m(&self, way_M: &Vector3<f64>) -> f64 {
-        let Solidity::Mesh(mesh) = self.solid else { return ball_reaches_m(self.ball(), way_M) };
-        let own_m = box_reaches_m(mesh.bounds_B(), &self.X_MO.inverse_transform_vector(way_M));
-        own_m + way_M.dot(&self.X_MO.translation.vector)
+    /// The box that it is in.
+    pub(super) fn extent(&self) -> Extent {
+        let own = match self.solid {
+            Solidity::Mesh(mesh) => mesh.bounds_B(),
+            Solidity::Form(form) => match Convex::of(form, &Isometry3::identity()) {
+                Some(convex) => [-1.0, 1.0].map(|sign| {
+                    let reaches_m = |axis: usize| {
+                        let way = Vector3::ith(axis, sign);
+                        sign * (way.dot(&convex.support(&way)) + convex.radius_m)
+                    };
+                    Vector3::new(reaches_m(0), reaches_m(1), reaches_m(2))
+                }),
+                None => {
+                    let radius_m =
+                        super::bounding_ball(&(*form).into()).map_or(0.0, |(_, radius_m)| radius_m);
+                    [-1.0, 1.0].map(|sign| Vector3::repeat(sign * radius_m))
+                }
+            },
+        };
+        Extent::of(own, &self.X_MO)
     }
 
     /// Where a point is with regard to it; deep inside, `along_M` is the way out that it came in by.

@@ -22,14 +22,14 @@
 
 use haptics::Feature;
 use haptics::mesh::{Linear, Mesh, Sides};
-use nalgebra::{Point3, Vector3};
+use nalgebra::{Isometry3, Point3, Vector3};
 
 use super::PairMemory;
 use super::mesh::{About, Contact, Told};
 use super::mesh_corner::Corner;
 use super::mesh_cut::{Edge, WayOut};
 use super::mesh_found::Found;
-use super::mesh_other::{Meeting, Other, Solidity, ball_reaches_m, box_reaches_m};
+use super::mesh_other::{Extent, Meeting, Other, Solidity};
 use super::mesh_own::Own;
 use super::mesh_patch::{MAX_PATCHES, Patch, Patches};
 use super::mesh_search::look_around;
@@ -179,12 +179,7 @@ impl Place<'_> {
         let (mesh, other, meeting) = (self.mesh, self.other, self.meeting);
         let n = meeting.normal_M;
         let height = Linear::from(&other.front(&-n, &meeting, mesh.extent_m()), -n);
-        let several = self.patches.are_several();
-        let reaches_m = |way: &Vector3<f64>| match several {
-            true => other.reaches_m(way),
-            false => ball_reaches_m(other.ball(), way),
-        };
-        let limits = meeting.limits(reaches_m, &height, self.behind_m());
+        let limits = meeting.limits(&other.extent(), mesh.longest_edge_m(), &height, self.behind_m());
         let limits = self.limits(mesh, &limits);
         let Meeting { reach_m, travel_m, .. } = meeting;
         let chosen = Standing { mesh, height, limits, reach_m, travel_m }.choose(stands);
@@ -274,15 +269,10 @@ impl Place<'_> {
     /// The other one's points against the mesh.
     fn owns(&mut self, stands: &mut super::Stands) {
         let (mesh, other, meeting) = (self.mesh, self.other, self.meeting);
-        let [low_M, high_M] = mesh.bounds_B();
-        let around = ((low_M + high_M) * 0.5, 0.5 * (high_M - low_M).norm());
         let height = Linear::from(&meeting.at_M, meeting.normal_M);
-        let several = self.patches.are_several();
-        let reaches_m = |way: &Vector3<f64>| match several {
-            true => box_reaches_m([low_M, high_M], way),
-            false => ball_reaches_m(around, way),
-        };
-        let limits = meeting.limits(reaches_m, &height, self.behind_m());
+        let edge_m = if let Solidity::Mesh(second) = other.solid { second.longest_edge_m() } else { 0.0 };
+        let extent = Extent::of(mesh.bounds_B(), &Isometry3::identity());
+        let limits = meeting.limits(&extent, edge_m, &height, self.behind_m());
         let limits = match other.solid {
             Solidity::Mesh(second) => self.limits(second, &limits),
             Solidity::Form(_) => &limits,

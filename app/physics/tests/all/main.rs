@@ -52,6 +52,7 @@ mod meshes_oracle;
 mod meshes_places;
 mod meshes_plane;
 mod meshes_sheets;
+mod meshes_stacks;
 mod no_allocation;
 mod pulls;
 mod put;

@@ -1,0 +1,75 @@
+//! Blocks of triangles that stand on each other, however finely they are cut, as boxes do.
+#![allow(non_snake_case)]
+
+use std::f64::consts::FRAC_PI_2;
+
+use crate::noise::Noise;
+use crate::{common, meshes};
+
+use common::*;
+use haptics::{Entity, Shape};
+use nalgebra::{Isometry3, UnitQuaternion, Vector3};
+use physics::{ContactStiffness, Settings};
+
+const MASS: f64 = 0.05;
+
+/// A block whose edges are cut into so many.
+fn block(size: [f64; 3], cuts: [usize; 3]) -> Shape {
+    let planes: [Vec<f64>; 3] = std::array::from_fn(|axis| {
+        let share = |cut: usize| cut as f64 / cuts[axis] as f64 - 0.5;
+        (0..=cuts[axis]).map(|cut| size[axis] * share(cut)).collect()
+    });
+    let planes = [&planes[0][..], &planes[1][..], &planes[2][..]];
+    meshes::build(meshes::cells(planes, |_| true)).into()
+}
+
+/// How far the highest of some is from where it was put, and by how much it leans, after a second (m, rad). They are put
+/// 0.1 mm above each other, each with a turn about the vertical and a way aside.
+fn moved(shape: &Shape, height: f64, places: &[(f64, [f64; 2])]) -> [f64; 2] {
+    let mut entities: Vec<Entity> = vec![floor(0.0, 1000.0, 0.5)];
+    for (at, (turn, [x, z])) in places.iter().enumerate() {
+        let y = height * (at as f64 + 0.5) + 1e-4 * (at as f64 + 1.0);
+        let turn = UnitQuaternion::from_axis_angle(&Vector3::y_axis(), *turn);
+        let X_WB = Isometry3::from_parts(Vector3::new(*x, y, *z).into(), turn);
+        entities.push(object(shape.clone(), X_WB, 1000.0, 0.5));
+    }
+    let bodies: Vec<_> = (1..entities.len()).map(|at| (at, body(&entities[at], MASS))).collect();
+    let last = entities[entities.len() - 1].X_WB;
+    let contact_stiffness = ContactStiffness::ByMass { damping_ratio: 1.0 };
+    let settings = Settings { contact_stiffness, ..Settings::default() };
+    let mut world = World::new(entities, &bodies, settings, 0);
+    for _ in 0..1000 {
+        world.step(&[]);
+    }
+    let now = world.entities[world.entities.len() - 1].X_WB;
+    let falls = Vector3::y() * (1e-4 * places.len() as f64);
+    let leans = (now.rotation * Vector3::y()).dot(&Vector3::y()).min(1.0).acos();
+    [(now.translation.vector - last.translation.vector + falls).norm(), leans]
+}
+
+#[test]
+fn planks_that_cross_lie_on_each_other_however_finely_they_are_cut() {
+    const SIZE: [f64; 3] = [0.075, 0.015, 0.025];
+    let noise = &mut Noise::new(3);
+    for cuts in [[1; 3], [2; 3], [4; 3], [8; 3], [15, 3, 5]] {
+        let plank = block(SIZE, cuts);
+        for turned in [0.0, 0.3, 0.8, FRAC_PI_2] {
+            let aside = [noise.within(-0.005, 0.005), noise.within(-0.005, 0.005)];
+            let [moved_m, leans] = moved(&plank, SIZE[1], &[(0.0, [0.0; 2]), (FRAC_PI_2 - turned, aside)]);
+            println!("{cuts:?}, {turned}: {moved_m} m, {leans} rad"); //ASSERT
+        }
+    }
+}
+
+#[test]
+fn cubes_that_are_put_a_little_aside_stand_on_each_other() {
+    for cuts in [1, 2, 5] {
+        let cube = block([0.03; 3], [cuts; 3]);
+        for aside in [0.0, 1e-4, 7e-4, 2e-3] {
+            let places: Vec<_> =
+                (0..6).map(|at| (0.0, [if at % 2 == 0 { aside } else { -aside }, 0.0])).collect();
+            let [moved_m, leans] = moved(&cube, 0.03, &places);
+            println!("{cuts}, {aside}: {moved_m} m, {leans} rad"); //ASSERT
+        }
+    }
+}
