@@ -74,6 +74,8 @@ impl Restitution {
             match meeting.leaves_m_s(dt_s).filter(|_| !meeting.is_among_many) {
                 Some(leaves_m_s) => {
                     meeting.reflect(row, leaves_m_s, dt_s);
+                    // What bounces does not roll: a torque as large as the impulse would drive it.
+                    (row.torsion, row.rolling) = Default::default();
                     impacts.push(meeting.row);
                 }
                 None => {

@@ -56,7 +56,7 @@ impl Looks<'_> {
             .then(|| format!("{name} begins {:.2} mm deep in {other}, and will be pushed out", depth_m * 1e3))
     }
 
-    /// Its own weight brings it deeper than a quarter of how thick the thinner one is: a little more, and it falls through.
+    /// On one point its own weight brings it deeper than a quarter of how thick the thinner one is: a little more, and it falls through.
     fn sinks(&self, a: usize, b: usize) -> Option<String> {
         let stiffness_n_per_m = self.stiffness_n_per_m(a, b);
         let sinks_m = self.weights_n[a] / stiffness_n_per_m;
@@ -73,9 +73,11 @@ impl Looks<'_> {
             )
         } else {
             format!(
-                "{name} sinks {:.2} mm into {other}, as soft as it is ({stiffness_n_per_m:.0} N/m a point); say `contact_stiffness = \
-                 {{ kind = \"by-mass\" }}` at the top of the scene, or give {name} a larger `contact_stiffness_n_per_m`",
-                sinks_m * 1e3
+                "{name} sinks {:.2} mm into {other} where it stands on one point, {:.2} mm on four, as soft as it is \
+                 ({stiffness_n_per_m:.0} N/m a point); say `contact_stiffness = {{ kind = \"by-mass\" }}` at the top of \
+                 the scene, or give {name} a larger `contact_stiffness_n_per_m`",
+                sinks_m * 1e3,
+                0.25 * sinks_m * 1e3
             )
         })
     }

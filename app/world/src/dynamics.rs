@@ -162,6 +162,10 @@ impl ContactStiffnessSpec {
         let kind = table.require("kind", "as-said, by-mass, as-felt, given")?;
         let kind = kind.choose("contact stiffness", &STIFFNESSES)?;
         let damping_ratio = table.number_or("damping_ratio", Bound::NotNegative, 1.0)?;
+        if damping_ratio > MOST_DAMPING_RATIO {
+            let value = table.require("damping_ratio", Bound::NotNegative)?;
+            return Err(value.out_of_range(format!("a number from 0 to {MOST_DAMPING_RATIO}; 1 is critical")));
+        }
         let unfit = |key: &str, allowed: &str| match table.get(key) {
             Some(value) => Err(value.out_of_range(allowed)),
             None => Ok(()),
@@ -219,6 +223,8 @@ const LISTS_KEYS: Vocabulary =
 const ALLOWED: &str =
     "a table such as { kind = \"impulse\", restitution = 0.5 } or { kind = \"force\", restitution = 0.5 }";
 const KEYS: Vocabulary = Vocabulary { available: &["kind", "restitution"], later: &[] };
+/// A spring that is damped so much comes back in seconds; far more is beyond what a tick can solve for.
+const MOST_DAMPING_RATIO: f64 = 1000.0;
 const STIFFNESS_EXAMPLE: &str = "a table such as { kind = \"by-mass\", damping_ratio = 1.0 }, { kind = \"as-felt\" } or \
                                  { kind = \"given\", stiffness_n_per_m = 1e5 }";
 const STIFFNESS_KEYS: Vocabulary =

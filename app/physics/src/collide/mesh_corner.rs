@@ -76,8 +76,28 @@ impl Corner {
         })
     }
 
-    /// Visits the ends of all sharp edges that leave it, each with its face and number there.
+    /// Visits the ends of all sharp edges that leave it, each with its face and number there. Edges that go straight on from
+    /// each other are one, however finely it is cut.
     pub(super) fn for_each_sharp_edge(self, mesh: &Mesh, mut visit: impl FnMut(&Vector3<f64>, u32, usize)) {
+        let from_M = self.point_M(mesh);
+        self.visit_sharp_edges(mesh, |mut to, face, edge| {
+            let along_M = (to.point_M(mesh) - from_M).normalize();
+            for _ in 0..MOST_PIECES {
+                let mut next = None;
+                to.visit_sharp_edges(mesh, |end, _, _| {
+                    let way_M = end.point_M(mesh) - to.point_M(mesh);
+                    if way_M.dot(&along_M) > STRAIGHT * way_M.norm() {
+                        next = Some(end);
+                    }
+                });
+                let Some(end) = next else { break };
+                to = end;
+            }
+            visit(to.point_M(mesh), face, edge);
+        });
+    }
+
+    fn visit_sharp_edges(self, mesh: &Mesh, mut visit: impl FnMut(Self, u32, usize)) {
         let mut fan = Fan::new(mesh, self.0 / 3, (self.0 % 3) as usize);
         while let Some((number, corner)) = fan.next() {
             let face = &mesh.faces()[number as usize];
@@ -85,7 +105,7 @@ impl Corner {
             let is_sharp =
                 link.is_boundary() || mesh.faces()[link.face() as usize].normal_B.dot(&face.normal_B) < SHARP;
             if is_sharp {
-                visit(&mesh.vertices()[face.vertices[(corner + 1) % 3] as usize], number, corner);
+                visit(Self(3 * number + (corner as u32 + 1) % 3), number, corner);
             }
         }
     }
@@ -145,6 +165,10 @@ const FLAT: f64 = 1e-6;
 const LOOKS: f64 = 0.2;
 /// Cosine between the faces of a sharp edge.
 const SHARP: f64 = 0.9;
+/// Cosine of a turn from one edge to the next that is none.
+const STRAIGHT: f64 = 1.0 - 1e-6;
+/// Pieces that make one edge.
+const MOST_PIECES: usize = 32;
 /// Steps of a climb; the next tick goes on.
 const MOST_STEPS: usize = 64;
 /// Faces that are looked at around a vertex.

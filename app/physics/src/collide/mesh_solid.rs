@@ -13,8 +13,8 @@
 //! Frames: the mesh's frame M; normals from the mesh to the other one.
 //! Of all that is found, what [carries](super::mesh_carry) counts.
 //! Limits: six places a pair. Crossings are found of a box's edges, of the lines along which cylinders, cones and capsules
-//! touch, and of sharp edges that leave the vertices of a mesh that were chosen: of fine meshes these are short, but vertices
-//! lie as near. Rims of round forms are not cut off. An ellipsoid touches with one point: a flat one that tumbles comes down on its
+//! touch, and of sharp edges that leave the vertices of a mesh that were chosen, as far as these go straight on; where they bend,
+//! vertices lie as near. Rims of round forms are not cut off. An ellipsoid touches with one point: a flat one that tumbles comes down on its
 //! other end at once, deep, and is let out slowly. A sheet has no inside: what is far behind it is taken for what has always
 //! been there, and limbs that are thin beside the way of a tick are lost now and then (`tests/all/meshes_sheets.rs` counts them).
 //! Cost: for each place two choices of vertices and at most eight queries for the nearest point for each side; and a search
@@ -179,7 +179,7 @@ impl Place<'_> {
         let (mesh, other, meeting) = (self.mesh, self.other, self.meeting);
         let n = meeting.normal_M;
         let height = Linear::from(&other.front(&-n, &meeting, mesh.extent_m()), -n);
-        let limits = meeting.limits(&other.extent(), mesh.longest_edge_m(), &height, self.behind_m());
+        let limits = meeting.limits(&other.extent(), self.beside_m(mesh), &height, self.behind_m());
         let limits = self.limits(mesh, &limits);
         let Meeting { reach_m, travel_m, .. } = meeting;
         let chosen = Standing { mesh, height, limits, reach_m, travel_m }.choose(stands);
@@ -215,6 +215,11 @@ impl Place<'_> {
     fn behind_m(&self) -> f64 {
         let (_, radius_m) = self.other.ball();
         if self.number == 0 { BEHIND_M.max(0.5 * radius_m) } else { BEHIND_M }
+    }
+
+    /// An edge that is cut off by the outline of a single place leaves a vertex so far beside it \[m\].
+    fn beside_m(&self, mesh: &Mesh) -> f64 {
+        if self.patches.are_several() { 0.0 } else { mesh.longest_edge_m() }
     }
 
     fn of_vertex(&self, at_M: &Vector3<f64>) -> Option<Seen> {
@@ -270,9 +275,9 @@ impl Place<'_> {
     fn owns(&mut self, stands: &mut super::Stands) {
         let (mesh, other, meeting) = (self.mesh, self.other, self.meeting);
         let height = Linear::from(&meeting.at_M, meeting.normal_M);
-        let edge_m = if let Solidity::Mesh(second) = other.solid { second.longest_edge_m() } else { 0.0 };
+        let beside_m = if let Solidity::Mesh(second) = other.solid { self.beside_m(second) } else { 0.0 };
         let extent = Extent::of(mesh.bounds_B(), &Isometry3::identity());
-        let limits = meeting.limits(&extent, edge_m, &height, self.behind_m());
+        let limits = meeting.limits(&extent, beside_m, &height, self.behind_m());
         let limits = match other.solid {
             Solidity::Mesh(second) => self.limits(second, &limits),
             Solidity::Form(_) => &limits,

@@ -2,9 +2,10 @@
 #![allow(non_snake_case)]
 
 use crate::common;
+use crate::noise::Noise;
 
 use common::{G, body, floor, object};
-use haptics::{Cuboid, Entity, Sphere};
+use haptics::{Cuboid, Cylinder, Entity, Shape, Sphere};
 use nalgebra::{Isometry3, Vector3};
 use physics::{Body, ContactStiffness, Integrator, Manipulation, Response, Settings};
 
@@ -186,6 +187,42 @@ fn boxes_bounce_flat_as_balls_do_and_tumble_without_a_gain() {
                     // As for balls; four points, each a part in a million soft.
                     let kept = first_m.expect("a bounce") / 0.04;
                     assert!((kept - 0.25).abs() < 1e-4, "{rate_hz}: {kept} {settings:?}");
+                }
+            }
+        }
+    }
+}
+
+/// Coins and cards so small that rolling friction reaches as far as they do: their edges come down one after the other.
+#[test]
+fn what_is_small_beside_its_rolling_friction_gains_nothing_from_a_bounce() {
+    let shapes: [Shape; 2] =
+        [Cylinder::new(5e-4, 2e-4).unwrap().into(), Cuboid::new([1e-3, 2e-4, 8e-4]).unwrap().into()];
+    let contact_stiffness = ContactStiffness::ByMass { damping_ratio: 1.0 };
+    let settings = Settings {
+        response: Response::Bounce { restitution: 1.0 },
+        contact_stiffness,
+        ..Settings::default()
+    };
+    for (at, shape) in shapes.iter().enumerate() {
+        for rolling_m in [2e-4, 1e-2] {
+            for seed in 0..20 {
+                let noise = &mut Noise::new(seed);
+                let X_WB = Isometry3::from_parts(Vector3::new(0.0, 2e-3, 0.0).into(), noise.turn());
+                let thing = object(shape.clone(), X_WB, 1000.0, 0.3)
+                    .with_turning_friction(rolling_m, rolling_m)
+                    .unwrap();
+                let state = body(&thing, 1e-4).moving(noise.vector(0.05), noise.vector(50.0));
+                let energy_j =
+                    |body: &Body| body.kinetic_energy_j() + body.mass.mass_kg * G * body.centre_W.y;
+                let began_j = energy_j(&state);
+                let mut entities = vec![floor(0.0, 1000.0, 0.3), thing];
+                let mut manipulation = Manipulation::new(&entities, &[(1, state)], settings).unwrap();
+                for tick in 0..2000 {
+                    manipulation.step(&mut entities, &mut [], 1.0 / 4000.0);
+                    let gained = energy_j(&manipulation.bodies()[0]) / began_j;
+                    // Between two ticks gravity is worth g h, and a bounce is told by the tick's middle.
+                    assert!(gained < 1.01, "{at}, {rolling_m}, {seed}, {tick}: {gained}");
                 }
             }
         }

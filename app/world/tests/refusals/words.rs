@@ -195,6 +195,10 @@ fn a_contact_stiffness_that_is_none_or_does_not_fit_its_kind_is_refused() {
             "s.toml:1: contact_stiffness.stiffness_n_per_m: found 1e5; allowed: none, but with kind = \"given\"",
         ),
         (
+            "{ kind = \"by-mass\", damping_ratio = 1e18 }",
+            "s.toml:1: contact_stiffness.damping_ratio: found 1e18; allowed: a number from 0 to 1000; 1 is critical",
+        ),
+        (
             "{ kind = \"as-felt\", damping_ratio = 1.0 }",
             "s.toml:1: contact_stiffness.damping_ratio: found 1.0; allowed: none with kind = \"as-felt\": dampers are the entities' own",
         ),
