@@ -14,6 +14,7 @@ use super::mesh_patch::MAX_PATCHES;
 use super::{MAX_POINTS, PATCH_POINTS};
 
 pub(super) struct Found {
+    are_meshes: bool,
     contacts: [Contact; ROOM],
     count: usize,
     /// Where each place's begin.
@@ -27,8 +28,9 @@ pub(super) struct Found {
 pub(super) type Carried = [u32; PATCH_POINTS];
 
 impl Found {
-    pub(super) fn new() -> Self {
+    pub(super) fn new(are_meshes: bool) -> Self {
         Self {
+            are_meshes,
             contacts: [Contact::default(); ROOM],
             count: 0,
             begins: [0; MAX_PATCHES + 1],
@@ -94,8 +96,8 @@ impl Found {
             let deeper_m = one.gap_m - contact.gap_m;
             let is_aside = one.normal_M.dot(&contact.normal_M) < AGREES;
             let stays = contact.carried && !one.carried && is_aside && deeper_m > -together_m;
-            // A corner that is beside a face by next to nothing takes no place from one that is on it.
-            let is_beside = is_aside && one.gap_m >= 0.0 && contact.gap_m < 0.0;
+            // Of two meshes a corner that is beside a face by next to nothing takes no place from one that is on it.
+            let is_beside = self.are_meshes && is_aside && one.gap_m >= 0.0 && contact.gap_m < 0.0;
             if there >= begin && (deeper_m > together_m || stays || is_beside) {
                 self.contacts[there] = contact;
             }

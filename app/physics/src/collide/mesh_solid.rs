@@ -71,7 +71,7 @@ pub(super) fn contact_points(
 /// All contacts, of each place by its plane.
 fn find(mesh: &Mesh, other: &Other<'_>, [reach_m, travel_m]: [f64; 2], patches: &mut Patches) -> Found {
     look_around(mesh, other, reach_m, travel_m, patches);
-    let mut found = Found::new();
+    let mut found = Found::new(matches!(other.solid, Solidity::Mesh(_)));
     for number in 0..MAX_PATCHES {
         found.begin(number, &patches.all[number].carried);
         if patches.all[number].is_known {
