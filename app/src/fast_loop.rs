@@ -100,7 +100,7 @@ pub struct Tally {
     pub moving: [usize; 2],
     /// Ticks in which there was more at a finger's place than it can feel at once.
     pub crowded: u64,
-    /// How often entities that were near each other, or points of theirs, had no room among what moves.
+    /// Number of times that contacts between entities had no room, in the fast list.
     pub left_out: u64,
     /// How often a force was cut because nothing moved for it.
     pub cuts: u64,

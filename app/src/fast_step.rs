@@ -198,7 +198,7 @@ impl FastStep {
         self.near.iter().any(Near::is_crowded)
     }
 
-    /// How often contacts between entities had no room so far, in the fast list.
+    /// Number of times that contacts between entities had no room so far, in the fast list.
     pub fn left_out(&self) -> u64 {
         self.objects.left_out()
     }

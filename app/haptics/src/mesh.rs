@@ -106,7 +106,7 @@ pub struct Mesh {
     uv: Option<Box<[FaceUv]>>,
     /// The label of each face, where somebody gave any.
     labels: Option<Box<[u16]>>,
-    /// What lies farthest out, if somebody has asked for it.
+    /// Vertices that lie farthest out, if somebody has asked for them.
     extremes: OnceLock<Extremes>,
 }
 

@@ -140,7 +140,7 @@ impl Anchor {
         self.worked[2] = self.turned.norm_squared();
     }
 
-    /// How far its spring was pressed when the last tick ended \[m\].
+    /// Depth that its spring was pressed by when the last tick ended \[m\].
     pub(crate) fn worked_m(&self) -> f64 {
         if self.share > 0.0 { (self.worked[0] / self.share).sqrt() } else { 0.0 }
     }

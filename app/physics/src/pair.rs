@@ -232,7 +232,7 @@ impl Pair {
         }
     }
 
-    /// How far springs are pressed at most that let something out \[m\]: it is no faster then when they throw it, and the
+    /// Depth up to which springs are pressed that let something out \[m\]: it is no faster then when they throw it, and the
     /// heaviest rests less deep.
     fn pushing_m(&self, start: &Start<'_>) -> f64 {
         let (a, b) = self.bodies;

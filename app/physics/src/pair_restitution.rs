@@ -30,7 +30,7 @@ impl Response {
     }
 }
 
-/// What an entity says of its contacts with others, or else what a finger feels.
+/// Stiffness that an entity says of its contacts with others, or else that a finger feels.
 fn stiffness_n_per_m(of: &Entity) -> f64 {
     of.contact_stiffness_n_per_m.unwrap_or(of.stiffness_n_per_m)
 }

@@ -14,7 +14,7 @@ use crate::solver::Motion;
 /// What counts as rest, and for how long.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Sleep {
-    /// What goes steadily, and no faster than this, rests \[m/s\].
+    /// A body that goes steadily, and no faster than this, rests \[m/s\].
     pub speed_m_s: f64,
     /// \[rad/s\]
     pub spin_rad_s: f64,

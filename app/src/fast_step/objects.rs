@@ -160,7 +160,7 @@ impl Objects {
         })
     }
 
-    /// How often contacts of the fast list had no room.
+    /// Number of times that contacts of the fast list had no room.
     pub fn left_out(&self) -> u64 {
         self.manipulation.left_out()
     }

@@ -189,7 +189,7 @@ impl Standing<'_> {
         found.map(|(corner, _)| Corner::new(corner))
     }
 
-    /// What is not over the face is not in it.
+    /// Depth in the face; a vertex that is not over it is not in it.
     fn depth_m(&self, corner: Corner) -> f64 {
         if self.is_over(corner) { -self.height_m(corner) } else { f64::MIN }
     }
@@ -222,7 +222,7 @@ const FIRST_TURNS: usize = 3;
 const STILL: f64 = 0.01;
 /// Depths below this are as this one \[m\].
 const LEAST_M: f64 = 1e-5;
-/// What is newly found is no deeper than what has come down in a tick, and this \[m\].
+/// Vertices that are newly found are no deeper than what has come down in a tick, and this \[m\].
 const BEHIND_M: f64 = 1e-3;
 /// Limits of a face, and the level.
 const MAX_LIMITS: usize = 6;

@@ -34,7 +34,7 @@ impl Manipulation {
         &self.changed
     }
 
-    /// How often pairs of entities that are near each other, or contact points, were left out for want of room.
+    /// Number of times that pairs of entities near each other, or contact points, were left out for want of room.
     pub fn left_out(&self) -> u64 {
         self.pairs.left_out
     }

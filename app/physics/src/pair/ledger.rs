@@ -101,7 +101,7 @@ impl Ledger {
         Self { held_j: full_j, lets_out, ..Self::default() }
     }
 
-    /// Whether it holds more than anything has pressed: what was there from the start, and is let out.
+    /// True while it holds more than anything has pressed: what was there from the start, and is let out.
     pub(super) fn lets_out(&self) -> bool {
         self.lets_out
     }

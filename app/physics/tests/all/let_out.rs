@@ -1,4 +1,4 @@
-//! What overlaps is let out slowly, whatever it is, however deep, and also where another way out becomes the shortest one.
+//! Things that overlap are let out slowly, whatever they are, however deep, and also where another way out becomes the shortest one.
 #![allow(non_snake_case)]
 
 use crate::common;

@@ -28,7 +28,7 @@ fn limbed(noise: &mut Noise, limbs: usize, most_m: f64) -> TriangleSoup {
     soup
 }
 
-/// What things stand on, with its upper side at y = 0.
+/// Things to stand on, with their upper side at y = 0.
 fn grounds() -> Vec<(&'static str, Entity)> {
     let slab = |size: [f64; 3]| {
         let at = Isometry3::translation(0.0, -0.5 * size[1], 0.0);
@@ -46,7 +46,7 @@ fn grounds() -> Vec<(&'static str, Entity)> {
     ]
 }
 
-/// How deep the lowest vertex is once it sleeps, of something that falls by 5 mm, turned at random (m).
+/// Depth of the lowest vertex once it sleeps, of something that falls by 5 mm, turned at random (m).
 fn rests_deep_m(soup: &TriangleSoup, ground: Entity, turn: UnitQuaternion<f64>) -> f64 {
     let lowest_m = |X_WB: &Isometry3<f64>| {
         let heights = soup.vertices.iter().map(|vertex| (X_WB * Point3::from(*vertex)).y);

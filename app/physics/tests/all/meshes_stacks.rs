@@ -23,7 +23,7 @@ fn block(size: [f64; 3], cuts: [usize; 3]) -> Shape {
     meshes::build(meshes::cells(planes, |_| true)).into()
 }
 
-/// How far the highest of some is from where it was put, and by how much it leans, after a second (m, rad). They are put
+/// The way of the highest of some from where it was put, and its lean, after a second (m, rad). They are put
 /// 0.1 mm above each other, each with a turn about the vertical and a way aside.
 fn moved(shape: &Shape, height: f64, places: &[(f64, [f64; 2])]) -> [f64; 2] {
     let mut entities: Vec<Entity> = vec![floor(0.0, 1000.0, 0.5)];
