@@ -7,6 +7,7 @@
 
 mod common_places;
 mod contacts;
+mod explicit;
 mod height_maps;
 mod measures;
 pub(crate) mod model_file;

@@ -20,6 +20,19 @@ pub enum BodyError {
         /// Principal moments found (kg m^2).
         moments: [f64; 3],
     },
+    /// Nearly all of the mass is in the middle.
+    #[error(
+        "inertia_kg_m2 is {moment_kg_m2} about {axis}; allowed is at least {least_kg_m2}, a thousandth of what a full box of \
+         this size and mass has: kilogrammes times square metres"
+    )]
+    Concentrated {
+        /// Own axis of the entity.
+        axis: &'static str,
+        /// Moment found (kg m^2).
+        moment_kg_m2: f64,
+        /// Least one allowed (kg m^2).
+        least_kg_m2: f64,
+    },
     /// Infinite, or without a volume.
     #[error(
         "a {shape} has no inertia of its own; give `inertia_kg_m2`, or leave out `mass_kg` and it is fixed"

@@ -5,8 +5,9 @@
 //! Frames: B the entity's frame, P the principal axes.
 
 use haptics::{ParameterError, Shape};
-use nalgebra::{Matrix3, UnitQuaternion, Vector3};
+use nalgebra::{Isometry3, Matrix3, UnitQuaternion, Vector3};
 
+use crate::broad_phase::Aabb;
 use crate::collide;
 use crate::error::BodyError;
 
@@ -32,10 +33,10 @@ impl MassProperties {
     /// Of a solid of this shape and mass, of one density.
     ///
     /// # Errors
-    /// A mass that is not finite or not positive; a shape without inertia (a plane, an own surface); a mesh that is not
-    /// closed or encloses nothing.
+    /// A mass below 1e-15 or above 1e15 kg; a shape without inertia (a plane, an own surface); a mesh that is not closed or
+    /// encloses nothing.
     pub fn of_shape(shape: &Shape, mass_kg: f64) -> Result<Self, BodyError> {
-        let mass_kg = positive("mass_kg", mass_kg)?;
+        let mass_kg = mass(mass_kg)?;
         if let Shape::Mesh(mesh) = shape {
             return Ok(polyhedron::volume(mesh)?.with_mass(mass_kg));
         }
@@ -50,10 +51,10 @@ impl MassProperties {
         let density_kg_m3 = positive("density_kg_m3", density_kg_m3)?;
         if let Shape::Mesh(mesh) = shape {
             let volume = polyhedron::volume(mesh)?;
-            return Ok(volume.with_mass(positive("mass_kg", density_kg_m3 * volume.volume_m3)?));
+            return Ok(volume.with_mass(mass(density_kg_m3 * volume.volume_m3)?));
         }
         let spread = spread(shape)?;
-        let mass_kg = positive("mass_kg", density_kg_m3 * spread.volume_m3)?;
+        let mass_kg = mass(density_kg_m3 * spread.volume_m3)?;
         Ok(Self::of_spread(&spread, mass_kg))
     }
 
@@ -70,9 +71,9 @@ impl MassProperties {
     /// about the centre of mass \[m, in B\], about the entity's own axes.
     ///
     /// # Errors
-    /// A mass that is not finite or not positive, a centre that is not finite, impossible moments.
+    /// A mass below 1e-15 or above 1e15 kg, a centre that is not finite, impossible moments.
     pub fn given(mass_kg: f64, centre_B: Vector3<f64>, moments: [f64; 3]) -> Result<Self, BodyError> {
-        let mass_kg = positive("mass_kg", mass_kg)?;
+        let mass_kg = mass(mass_kg)?;
         if let Some(&value) = centre_B.iter().find(|value| !value.is_finite()) {
             let (parameter, allowed) = ("centre_of_mass_m", "finite numbers");
             return Err(ParameterError::OutOfRange { parameter, value, allowed }.into());
@@ -96,6 +97,29 @@ impl MassProperties {
         Ok(Self { principal_kg_m2: moments.into(), axes_BP: UnitQuaternion::identity(), ..self })
     }
 
+    /// The same if it can be that of this shape: contacts at a shape's ends cannot be solved for a mass that is all in its
+    /// middle.
+    ///
+    /// # Errors
+    /// A moment below a thousandth of what the box around the shape would have, if it were full of the mass.
+    pub fn fitting(self, shape: &Shape) -> Result<Self, BodyError> {
+        let Some(around) = Aabb::of_shape(shape, &Isometry3::identity()) else { return Ok(self) };
+        let half_m = (around.high_W - around.low_W) * 0.5;
+        let full = Vector3::from_fn(|i, _| {
+            let across_m2 = half_m.norm_squared() - half_m[i] * half_m[i];
+            self.mass_kg / 3.0 * across_m2
+        });
+        let inertia_B = self.inertia_B().diagonal();
+        match (0..3).find(|&i| inertia_B[i] < LEAST_SPREAD * full[i]) {
+            Some(axis) => Err(BodyError::Concentrated {
+                axis: ["x", "y", "z"][axis],
+                moment_kg_m2: inertia_B[axis],
+                least_kg_m2: LEAST_SPREAD * full[axis],
+            }),
+            None => Ok(self),
+        }
+    }
+
     /// The same mass with its centre elsewhere (m, in B).
     ///
     /// The moments stay as they are and are those about the new centre: a body that is not of one density. What is known
@@ -109,6 +133,18 @@ impl MassProperties {
         let R_BP = self.axes_BP.to_rotation_matrix();
         R_BP * Matrix3::from_diagonal(&self.principal_kg_m2) * R_BP.transpose()
     }
+}
+
+/// Of a body \[kg\]: beyond, forces of fingers are no numbers any more.
+const MASSES_KG: [f64; 2] = [1e-15, 1e15];
+/// Of the moments of a full box around a shape: the least that a body of this shape may have.
+const LEAST_SPREAD: f64 = 1e-3;
+
+fn mass(value: f64) -> Result<f64, ParameterError> {
+    let [least, most] = MASSES_KG;
+    let (parameter, allowed) = ("mass_kg", "a number from 1e-15 to 1e15");
+    let is_one = (least..=most).contains(&value);
+    if is_one { Ok(value) } else { Err(ParameterError::OutOfRange { parameter, value, allowed }) }
 }
 
 pub(crate) fn positive(parameter: &'static str, value: f64) -> Result<f64, ParameterError> {

@@ -1,6 +1,6 @@
 //! What runs, but hardly as meant.
 
-use super::{contacts, together};
+use super::{contacts, explicit, together};
 use crate::rig::{Rig, in_words};
 use crate::study::stiffness::bounds::Theory;
 use crate::study::stiffness::case::{Axis, Case, Hand, Mode};
@@ -20,6 +20,7 @@ pub(super) fn all(rig: &Rig, whole: &Scene, entities: &[Entity]) -> Vec<String> 
     warnings.extend(too_damped(rig));
     warnings.extend(together::too_much(rig, entities, &mut stands));
     warnings.extend(contacts::all(rig, entities));
+    warnings.extend(explicit::all(rig, entities));
     warnings.extend(inside(rig, entities));
     warnings.extend(closed(rig, entities));
     warnings.extend(idle_faces(rig));

@@ -73,6 +73,10 @@ impl Rig {
         }
     }
 
+    pub(crate) fn integrator(&self) -> Integrator {
+        self.dynamics().integrator
+    }
+
     /// Contacts between entities, as a run has them.
     pub(crate) fn contacts(&self, entities: &[Entity]) -> Contacts {
         let heaviest_kg = self.masses(entities).map(|(_, mass_kg)| mass_kg).fold(0.0, f64::max);
@@ -281,7 +285,7 @@ fn body(entity: &Entity, motion: &MotionSpec) -> Result<Body, BodyError> {
             centre_m.map_or(turned, |centre_m| turned.with_centre(centre_m.into()))
         }
     };
-    let body = Body::at_rest(mass, &entity.X_WB);
+    let body = Body::at_rest(mass.fitting(&entity.shape)?, &entity.X_WB);
     let body = if motion.rotation_locked { body.with_rotation_locked() } else { body };
     Ok(body.moving(motion.velocity_m_s, motion.angular_velocity_rad_s))
 }

@@ -144,6 +144,20 @@ fn a_scene_that_is_wrong_is_refused_with_file_line_key_finding_and_remedy() {
             ) + "mass_kg = 0.1\ninertia_kg_m2 = [1e-5, 1e-5, 3e-5]",
             &["scene.toml:2: entity table", "inertia_kg_m2 is [0.00001, 0.00001, 0.00003]", "sum"],
         ),
+        (
+            entity("").replace(
+                "kind = \"plane\", normal = [0.0, 1.0, 0.0], offset_m = 0.0",
+                "kind = \"sphere\", radius_m = 0.1",
+            ) + "mass_kg = 0.1\ninertia_kg_m2 = [1e-3, 1e-9, 1e-3]",
+            &["scene.toml:2: entity table", "inertia_kg_m2 is 0.000000001 about y", "at least 0.00000066"],
+        ),
+        (
+            entity("").replace(
+                "kind = \"plane\", normal = [0.0, 1.0, 0.0], offset_m = 0.0",
+                "kind = \"sphere\", radius_m = 0.1",
+            ) + "mass_kg = 1e-200",
+            &["scene.toml:2: entity table", "mass_kg", "1e-15 to 1e15"],
+        ),
         (entity("stiffness_n_per_m = 0"), &["entity[0].stiffness_n_per_m", "found 0", "above 0"]),
         (entity("damping_n_s_per_m = -1"), &["entity[0].damping_n_s_per_m", "found -1", "0 or more"]),
         (

@@ -465,6 +465,65 @@ fn a_stack_that_slept_is_recorded_as_one_that_never_does() {
     }
 }
 
+/// Of a stack of three that are as heavy, the lowest carries three times as much as the highest, on points of 500 N/m.
+#[test]
+fn check_tells_by_what_stands_on_it_how_deep_each_of_a_stack_sinks_into_the_one_below() {
+    let cube = |at: usize| {
+        format!(
+            "[[entity]]\nname = \"c{at}\"\nposition_m = [0, {}, 0]\nmass_kg = 1\nstiffness_n_per_m = 1000\n\
+             shape = {{ kind = \"box\", size_m = [0.04, 0.02, 0.04] }}\n",
+            0.01 + 0.02 * at as f64
+        )
+    };
+    let floor = "[[entity]]\nname = \"floor\"\nstiffness_n_per_m = 1000\n\
+                 shape = { kind = \"plane\", normal = [0, 1, 0], offset_m = 0 }\n";
+    let place = Workplace::new();
+    place.write(
+        "scene.toml",
+        &format!("[[finger]]\nstart_m = [0, 1, 0]\n{floor}{}{}{}", cube(0), cube(1), cube(2)),
+    );
+    let said = place.run(["check", "scene.toml"]).out;
+    for (pair, depth_mm) in [
+        ("c0 sinks", "58.86 mm into floor"),
+        ("c1 sinks", "39.24 mm into c0"),
+        ("c2 sinks", "19.62 mm into c1"),
+    ] {
+        assert!(said.contains(&format!("{pair} {depth_mm}")), "{said}");
+    }
+    assert_eq!(said.matches(" sinks ").count(), 3, "{said}");
+}
+
+/// A gram on springs that a kilogram stands on: thrown away without the integrator that takes forces of the tick's end.
+#[test]
+fn check_tells_what_an_integrator_throws_away() {
+    let scene = |integrator: &str, mass_kg: f64| {
+        format!(
+            "integrator = \"{integrator}\"\n[[finger]]\nstart_m = [0, 1, 0]\n\
+             [[entity]]\nname = \"floor\"\nstiffness_n_per_m = 4000\n\
+             shape = {{ kind = \"plane\", normal = [0, 1, 0], offset_m = 0 }}\n\
+             [[entity]]\nname = \"cube\"\nposition_m = [0, 0.021, 0]\nmass_kg = {mass_kg}\nstiffness_n_per_m = 4000\n\
+             shape = {{ kind = \"box\", size_m = [0.04, 0.04, 0.04] }}\n"
+        )
+    };
+    for (integrator, mass_kg, is_thrown) in [
+        ("thesis-euler", 0.001, true),
+        ("thesis-euler", 1.0, false),
+        ("rk4", 0.0005, true),
+        ("rk4", 1.0, false),
+        ("implicit", 0.0005, false),
+    ] {
+        let scene = scene(integrator, mass_kg);
+        let place = Workplace::new();
+        place.write("scene.toml", &scene);
+        let said = place.run(["check", "scene.toml"]).out;
+        assert_eq!(said.contains("throws away cube"), is_thrown, "{integrator} {mass_kg}: {said}");
+        let fastest =
+            played(&scene, &alone(1.0)).body("cube").iter().map(|at| at.velocity.norm()).fold(0.0, f64::max);
+        // It falls by a millimetre: 0.14 m/s.
+        assert_eq!(fastest > 0.2, is_thrown, "{integrator} {mass_kg}: {fastest} m/s");
+    }
+}
+
 /// As soft as fingers feel both, it sinks through; by mass it rests, and so does what says no stiffness.
 #[test]
 fn a_ball_of_steel_rests_on_a_thin_plate_where_contacts_are_stiff_and_check_tells_where_they_are_not() {

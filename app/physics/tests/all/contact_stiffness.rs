@@ -6,7 +6,7 @@ use crate::{common, meshes};
 use common::{G, body, floor, object};
 use haptics::{Cuboid, Entity, Sphere};
 use nalgebra::{Isometry3, UnitQuaternion, Vector3};
-use physics::{Body, ContactStiffness, Manipulation, Response, Settings};
+use physics::{Body, BodyError, ContactStiffness, Manipulation, MassProperties, Response, Settings};
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
 const BY_MASS: ContactStiffness = ContactStiffness::ByMass { damping_ratio: 1.0 };
@@ -47,6 +47,27 @@ impl Table {
     fn body(&self, index: usize) -> &Body {
         &self.manipulation.bodies()[index]
     }
+}
+
+/// On its corners, 28 mm from where its mass is.
+#[test]
+fn a_box_whose_mass_is_nearly_all_in_its_middle_stands_as_deep_as_any_other() {
+    let entity = cube(0.04, 0.03);
+    let shape = &entity.shape;
+    let of = |share: f64| {
+        let moment = share * 0.1 / 6.0 * 0.04 * 0.04;
+        MassProperties::of_shape(shape, 0.1).unwrap().with_inertia([moment; 3]).unwrap().fitting(shape)
+    };
+    assert!(matches!(of(0.99e-3), Err(BodyError::Concentrated { axis: "x", .. })));
+    let mut entities = vec![floor(0.0, 1000.0, 0.5), entity.clone()];
+    let body = Body::at_rest(of(1.01e-3).unwrap(), &entity.X_WB);
+    let mut manipulation = Manipulation::new(&entities, &[(1, body)], settings(BY_MASS)).unwrap();
+    for _ in 0..1000 {
+        manipulation.step(&mut entities, &mut [], 1e-3);
+    }
+    // m g / 4 on points of m 10^6.
+    let deep_m = 0.02 - entities[1].X_WB.translation.y;
+    assert!((deep_m - G / 4e6).abs() < 1e-9, "{deep_m}");
 }
 
 fn ball(radius_m: f64, height_m: f64) -> Entity {
