@@ -138,6 +138,9 @@ impl Limits {
     }
 
     pub(crate) fn spin(&self, body: &mut Body) {
+        if midpoint::fastest(body) <= self.spin_rad_s {
+            return;
+        }
         let spin = body.angular_velocity_W().norm();
         if spin > self.spin_rad_s {
             body.angular_momentum_W *= self.spin_rad_s / spin;

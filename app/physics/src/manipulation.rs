@@ -60,6 +60,8 @@ pub struct Manipulation {
     rows: Vec<Row>,
     motions: Vec<Motion>,
     speeds_m_s: Vec<f64>,
+    /// How each of them turns when the tick begins \[rad/s\].
+    spins_W: Vec<Vector3<f64>>,
     /// Of each body, what a tick took from it \[J\].
     spare_j: Vec<f64>,
     solver: Solver,
@@ -146,6 +148,7 @@ impl Manipulation {
             rows: Vec::with_capacity(room),
             motions: Vec::with_capacity(places),
             speeds_m_s: Vec::with_capacity(places),
+            spins_W: Vec::with_capacity(places),
             spare_j: Vec::with_capacity(places),
             solver: Solver::with_capacity(room, places),
             hand: Hand::new(&[], count),
@@ -271,10 +274,11 @@ fn who<'w>(roster: &'w Roster, all: &'w [Entity], contacts: Contacts) -> Who<'w>
 }
 
 fn moving(body: &Body) -> Motion {
+    let inverse_inertia_W = body.inverse_inertia_W();
     Motion {
         velocity_W: body.velocity_W,
-        angular_velocity_W: body.angular_velocity_W(),
+        angular_velocity_W: inverse_inertia_W * body.angular_momentum_W,
         inverse_mass: body.mass.mass_kg.recip(),
-        inverse_inertia_W: body.inverse_inertia_W(),
+        inverse_inertia_W,
     }
 }

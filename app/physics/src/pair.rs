@@ -9,7 +9,7 @@ mod pressed;
 mod surfacing;
 mod turning;
 
-use haptics::Entity;
+use haptics::{Entity, Form, Shape};
 use nalgebra::{Isometry3, Vector3};
 
 use crate::anchor::Anchor;
@@ -74,6 +74,8 @@ pub(crate) struct Start<'t> {
     pub(crate) motions: &'t [Motion],
     /// The most that any point of each moves per time \[m/s\].
     pub(crate) speeds_m_s: &'t [f64],
+    /// How each turns when the tick begins \[rad/s\].
+    pub(crate) spins_W: &'t [Vector3<f64>],
     pub(crate) dt_s: f64,
     /// Whether forces are those of the end of the tick.
     pub(crate) is_implicit: bool,
@@ -408,6 +410,11 @@ pub(crate) fn is_near(a: &Entity, b: &Entity, reach_m: f64) -> bool {
     let do_balls_meet = match (bounding_ball(&a.shape), bounding_ball(&b.shape)) {
         (Some((at_a, r_a)), Some((at_b, r_b))) => {
             (centre(a, at_a) - centre(b, at_b)).norm_squared() <= (r_a + r_b + reach_m).powi(2)
+        }
+        (Some((at_a, r_a)), None) => {
+            let Shape::Form(Form::Plane(plane)) = &b.shape else { return true };
+            let at_B = b.X_WB.inverse_transform_point(&centre(a, at_a).into()).coords;
+            return plane.normal_B().dot(&at_B) - plane.offset_m() <= r_a + reach_m;
         }
         _ => return true,
     };

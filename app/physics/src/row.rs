@@ -245,9 +245,11 @@ impl Row {
             self.turning_m[0],
             self.turning_m[1],
         ];
-        vectors.iter().all(|v| v.iter().all(|x| x.is_finite()))
-            && not_negative.iter().all(|x| x.is_finite() && *x >= 0.0)
-            && torsion.rest_nm.is_finite()
+        // Zero times what is no number, or infinite, is no number.
+        let zero = vectors.iter().fold(Vector3::zeros(), |zero: Vector3<f64>, v| zero + *v * 0.0).sum()
+            + not_negative.iter().fold(torsion.rest_nm * 0.0, |zero, x| zero + x * 0.0);
+        zero == 0.0
+            && not_negative.iter().fold(0.0_f64, |least, x| least.min(*x)) >= 0.0
             && self.tie_n.is_none_or(|most_n| most_n.is_finite() && most_n >= 0.0)
     }
 

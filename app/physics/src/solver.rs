@@ -71,6 +71,8 @@ pub struct Solver {
     starts: Vec<usize>,
     /// Of each body, its place in its island.
     places: Vec<usize>,
+    /// Of each body, whether it is made of numbers.
+    are_finite: Vec<bool>,
     newton: Newton,
     together: together::Room,
 }
@@ -85,6 +87,7 @@ impl Solver {
             homes: Vec::with_capacity(rows),
             starts: Vec::with_capacity(bodies + 2),
             places: Vec::with_capacity(bodies),
+            are_finite: Vec::with_capacity(bodies),
             newton: Newton::with_capacity(rows, bodies),
             together: together::Room::with_capacity(rows),
         }
@@ -148,7 +151,13 @@ impl Solver {
             bodies.iter().enumerate().for_each(|(place, &body)| self.places[body] = place);
         }
         self.homes.clear();
-        self.homes.extend(rows.iter().map(|row| home(row, motions, &self.islands).unwrap_or(islands)));
+        self.are_finite.clear();
+        self.are_finite.extend(motions.iter().map(Motion::is_finite));
+        let home = |row: &Row| {
+            let home = is_sound(row, &self.are_finite).then(|| home(row, motions, &self.islands));
+            home.flatten().unwrap_or(islands)
+        };
+        self.homes.extend(rows.iter().map(home));
         self.starts.clear();
         self.starts.resize(islands + 2, 0);
         self.homes.iter().for_each(|&home| self.starts[home + 1] += 1);
@@ -166,13 +175,11 @@ impl Solver {
     }
 }
 
-/// The island of a row: that of a body which it moves; of a sound one only.
+/// The island of a row: that of a body which it moves.
 fn home(row: &Row, motions: &[Motion], islands: &Islands) -> Option<usize> {
-    let moved_other = row.other.filter(|&other| motions.get(other).is_some_and(Motion::is_movable));
-    is_sound(row, motions).then(|| {
-        let is_movable = motions[row.body].is_movable();
-        islands.island_of(if is_movable { row.body } else { moved_other.unwrap_or(row.body) })
-    })?
+    let is_movable = |body: &usize| motions[*body].is_movable();
+    let moved_other = row.other.filter(is_movable);
+    islands.island_of(if is_movable(&row.body) { row.body } else { moved_other.unwrap_or(row.body) })
 }
 
 /// Whether these rows are all between their body and what stands still.
@@ -183,8 +190,8 @@ fn is_alone(rows: &[Row], which: &[usize], motions: &[Motion]) -> bool {
 }
 
 /// Whether bodies and numbers of a row exist.
-fn is_sound(row: &Row, motions: &[Motion]) -> bool {
-    let exists = |body: usize| motions.get(body).is_some_and(Motion::is_finite);
+fn is_sound(row: &Row, are_finite: &[bool]) -> bool {
+    let exists = |body: usize| are_finite.get(body) == Some(&true);
     exists(row.body) && row.other.is_none_or(|other| other != row.body && exists(other)) && row.is_finite()
 }
 

@@ -64,7 +64,11 @@ impl Spots {
         let depth_m = (-spot.gap_m).max(0.0);
         let (mut taken_m, mut nearest) = (0.0_f64, f64::INFINITY);
         for other in self.as_slice() {
-            let apart = (other.on_a - spot.on_a).norm() / self.fade_m;
+            let apart_m2 = (other.on_a - spot.on_a).norm_squared();
+            if apart_m2 > self.fade_m * self.fade_m {
+                continue;
+            }
+            let apart = apart_m2.sqrt() / self.fade_m;
             let both_m = depth_m.min(-other.gap_m).max(0.0);
             taken_m = taken_m.max((1.0 - apart).max(0.0) * both_m);
             nearest = nearest.min(apart);

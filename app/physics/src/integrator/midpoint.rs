@@ -47,7 +47,7 @@ pub(crate) fn mean_angular_velocity_W(body: &Body, dt_s: f64) -> Vector3<f64> {
 }
 
 /// No angular velocity with this angular momentum is larger \[rad/s\].
-fn fastest(body: &Body) -> f64 {
+pub(super) fn fastest(body: &Body) -> f64 {
     body.angular_momentum_W.norm() / body.mass.principal_kg_m2.min()
 }
 

@@ -22,10 +22,12 @@ impl Manipulation {
         self.entities.clear();
         self.motions.clear();
         self.speeds_m_s.clear();
+        self.spins_W.clear();
         let fall_W = self.settings.gravity_W * dt_s;
         for &number in self.roster.awake() {
             let (body, entity) = (self.roster.bodies[number], self.roster.entities[number]);
             let mut motion = moving(&body);
+            self.spins_W.push(motion.angular_velocity_W);
             motion.velocity_W += fall_W;
             if self.settings.integrator.is_implicit() {
                 motion.angular_velocity_W = mean_angular_velocity_W(&body, dt_s);
@@ -100,6 +102,7 @@ impl Manipulation {
                 bodies: &self.bodies,
                 motions: &self.motions,
                 speeds_m_s: &self.speeds_m_s,
+                spins_W: &self.spins_W,
                 dt_s,
                 is_implicit: self.settings.integrator.is_implicit(),
             };
@@ -157,6 +160,7 @@ impl Manipulation {
         self.bodies.push(still);
         self.entities.push(entity);
         self.speeds_m_s.push(0.0);
+        self.spins_W.push(zero);
         self.entities.len() - 1
     }
 }

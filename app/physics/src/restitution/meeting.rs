@@ -171,10 +171,8 @@ enum Leaves {
 
 /// Velocity of the body's point relative to the other's when the tick begins.
 fn at_start(row: &Row, start: &Start<'_>) -> Vector3<f64> {
-    let at = |body: usize, arm_W: &Vector3<f64>| {
-        let body = &start.bodies[body];
-        body.velocity_W + body.angular_velocity_W().cross(arm_W)
-    };
+    let at =
+        |body: usize, arm_W: &Vector3<f64>| start.bodies[body].velocity_W + start.spins_W[body].cross(arm_W);
     at(row.body, &row.arms_W[0]) - row.other.map_or(Vector3::zeros(), |other| at(other, &row.arms_W[1]))
 }
 

@@ -33,6 +33,8 @@ pub(super) struct Trial {
     pub(super) p: Vec<Vector6>,
     /// `u_0 + W p`.
     pub(super) moving: Vec<Motion>,
+    /// How fast each of them goes \[m/s\] and turns \[rad/s\].
+    speeds: Vec<[f64; 2]>,
     pub(super) left: Vec<Vector6>,
     /// Twice the kinetic energy of what is left \[J\].
     pub(super) left_j: f64,
@@ -45,7 +47,8 @@ pub(super) struct Trial {
 impl Trial {
     pub(super) fn with_capacity(bodies: usize) -> Self {
         let room = || Vec::with_capacity(bodies);
-        Self { p: room(), left: room(), moving: Vec::with_capacity(bodies), ..Self::default() }
+        let (moving, speeds) = (Vec::with_capacity(bodies), Vec::with_capacity(bodies));
+        Self { p: room(), left: room(), moving, speeds, ..Self::default() }
     }
 
     pub(super) fn is_within(&self, share: f64) -> bool {
@@ -85,10 +88,13 @@ impl Equations<'_> {
         }));
     }
 
-    /// What is left at the trial's `p`, if forces act for this share of the tick.
-    pub(super) fn evaluate(&self, rows: &[Row], trial: &mut Trial, load: f64) {
+    /// What is left at the trial's `p`.
+    pub(super) fn evaluate(&self, rows: &[Row], trial: &mut Trial) {
         self.moving(trial);
-        let Trial { p, moving, left, .. } = trial;
+        let Trial { p, moving, speeds, left, .. } = trial;
+        speeds.clear();
+        speeds
+            .extend(moving.iter().map(|motion| [motion.velocity_W.norm(), motion.angular_velocity_W.norm()]));
         left.clear();
         left.resize(p.len(), Vector6::zeros());
         let (mut all, mut noise) = (0.0, 0.0);
@@ -109,37 +115,29 @@ impl Equations<'_> {
             for (side, place) in link.inside() {
                 left[place] -= on_side(row, side, &force_W, &torque_W);
             }
-            let gives = link.most_give(row, moving);
+            let gives = link.most_give;
             let [along, across] = row.falls(self.dt_s);
-            let rounding_n = ROUNDING * along.max(across) * link.speed_m_s(row, moving);
+            let rounding_n = ROUNDING * along.max(across) * link.speed_m_s(speeds);
             all += force_W.norm_squared() * gives;
             noise += rounding_n * rounding_n * gives;
             if row.has_torque() {
-                let turns = link.most_turn(moving);
+                let turns = link.most_turn;
                 let falls = row.torsion.falls(self.dt_s).max(row.rolling.falls(self.dt_s));
-                let rounding_nm = ROUNDING * falls * link.most_spin_rad_s(moving);
+                let rounding_nm = ROUNDING * falls * link.most_spin_rad_s(speeds);
                 all += torque_W.norm_squared() * turns;
                 noise += rounding_nm * rounding_nm * turns;
             }
         }
-        let acts_s = self.dt_s * load;
         trial.left_j = 0.0;
         for ((left, p), start) in left.iter_mut().zip(p).zip(self.starts) {
-            *left = *p + *left * acts_s;
+            *left = *p + *left * self.dt_s;
             trial.left_j += energy(start, left);
         }
-        (trial.all_j, trial.noise_j) = (all * acts_s * acts_s, noise * acts_s * acts_s);
+        (trial.all_j, trial.noise_j) = (all * self.dt_s * self.dt_s, noise * self.dt_s * self.dt_s);
     }
 
     /// Of what is left, by `p`; of torsion the chords, if wanted.
-    pub(super) fn derive(
-        &self,
-        rows: &[Row],
-        moving: &[Motion],
-        load: f64,
-        chords: bool,
-        blocks: &mut Blocks,
-    ) {
+    pub(super) fn derive(&self, rows: &[Row], moving: &[Motion], chords: bool, blocks: &mut Blocks) {
         blocks.clear();
         for (at, link) in self.links.iter().enumerate() {
             let row = &rows[link.row];
@@ -160,7 +158,6 @@ impl Equations<'_> {
             });
             link.add_falls(row, &falls, turns.as_ref(), blocks);
         }
-        let acts_s = self.dt_s * load;
         blocks.for_each(|row, column, block| {
             let start = &self.starts[column];
             for (at, values) in block.iter_mut().enumerate() {
@@ -168,7 +165,7 @@ impl Equations<'_> {
                 let along = start.inverse_mass;
                 *values =
                     [values[0] * along, values[1] * along, values[2] * along, about.x, about.y, about.z];
-                values.iter_mut().for_each(|value| *value *= acts_s);
+                values.iter_mut().for_each(|value| *value *= self.dt_s);
                 if row == column {
                     values[at] += 1.0;
                 }

@@ -46,7 +46,7 @@ impl Hold<'_> {
         holds_n.resize(equations.links.len(), 0.0);
         let settled = match begin {
             Begin::Here => {
-                equations.evaluate(rows, self.now, 1.0);
+                equations.evaluate(rows, self.now);
                 self.hold(equations, rows, holds_n);
                 NEARLY_SETTLED
             }
@@ -82,12 +82,12 @@ impl Hold<'_> {
 
     /// Where the function is least; says how many rounds that took.
     fn least(&mut self, equations: &Equations<'_>, rows: &[Row], most_rounds: usize) -> usize {
-        equations.evaluate(rows, self.now, 1.0);
+        equations.evaluate(rows, self.now);
         for round in 0..most_rounds {
             if self.now.is_within(FOUND) {
                 return round;
             }
-            equations.derive(rows, &self.now.moving, 1.0, false, self.blocks);
+            equations.derive(rows, &self.now.moving, false, self.blocks);
             self.change.clear();
             self.change.extend_from_slice(&self.now.left);
             if !self.blocks.solve(self.change) {
@@ -107,7 +107,7 @@ impl Hold<'_> {
         for _ in 0..MOST_TRIES {
             self.next.p.clear();
             self.next.p.extend(self.now.p.iter().zip(&*self.change).map(|(p, way)| p - way * share));
-            equations.evaluate(rows, self.next, 1.0);
+            equations.evaluate(rows, self.next);
             let there = equations.energy_between(&self.next.left, self.change);
             if there.abs() <= LEVEL * slope || there > 0.0 && rises.is_none() {
                 break;

@@ -19,13 +19,16 @@ pub struct Islands {
     /// Where the bodies of each island begin in `members`.
     starts: Vec<usize>,
     members: Vec<usize>,
+    /// Of each body, whether anything moves it.
+    moves: Vec<bool>,
 }
 
 impl Islands {
     /// Room for so many bodies.
     pub fn with_capacity(bodies: usize) -> Self {
         let room = || Vec::with_capacity(bodies + 1);
-        Self { room: bodies, roots: room(), numbers: room(), starts: room(), members: room() }
+        let moves = Vec::with_capacity(bodies);
+        Self { room: bodies, roots: room(), numbers: room(), starts: room(), members: room(), moves }
     }
 
     /// The islands that these rows make of the bodies, each as the numbers of its bodies. A body that presses no other is
@@ -34,8 +37,11 @@ impl Islands {
         let bodies = self.room.min(motions.len());
         self.roots.clear();
         self.roots.extend(0..bodies);
+        self.moves.clear();
+        let moves = |motion: &Motion| motion.is_movable() && motion.is_finite();
+        self.moves.extend(motions[..bodies].iter().map(moves));
         for row in rows {
-            if let Some([a, b]) = joins(row, &motions[..bodies]) {
+            if let Some([a, b]) = self.joins(row) {
                 self.join(a, b);
             }
         }
@@ -56,6 +62,13 @@ impl Islands {
     /// Whether a body is of an island of several.
     pub(crate) fn are_many(&self, body: usize) -> bool {
         self.island_of(body).is_some_and(|at| self.starts[at + 1] - self.starts[at] > 1)
+    }
+
+    /// The two bodies that a row joins.
+    fn joins(&self, row: &Row) -> Option<[usize; 2]> {
+        let other = row.other?;
+        let moves = |body: usize| self.moves.get(body) == Some(&true);
+        (other != row.body && moves(row.body) && moves(other)).then_some([row.body, other])
     }
 
     fn join(&mut self, a: usize, b: usize) {
@@ -100,12 +113,4 @@ impl Islands {
             *last = bodies;
         }
     }
-}
-
-/// The two bodies that a row joins.
-fn joins(row: &Row, motions: &[Motion]) -> Option<[usize; 2]> {
-    let other = row.other?;
-    let moves =
-        |body: usize| motions.get(body).is_some_and(|motion| motion.is_movable() && motion.is_finite());
-    (other != row.body && moves(row.body) && moves(other)).then_some([row.body, other])
 }

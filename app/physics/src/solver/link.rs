@@ -21,25 +21,48 @@ pub(super) struct Link {
     given_W: Vector3<f64>,
     /// The like of how they turn (rad/s).
     given_spin_W: Vector3<f64>,
+    /// The most velocity that an impulse gives to the point, in whatever direction (1/kg).
+    pub(super) most_give: f64,
+    /// The most spin that an angular impulse gives, in whatever direction (1/(kg m^2)).
+    pub(super) most_turn: f64,
+    /// Lengths of the arms (m).
+    arms_m: [f64; 2],
 }
 
 impl Link {
     /// Between one body and what stands still.
-    pub(super) fn alone(row: usize) -> Self {
-        let still = Vector3::zeros();
-        Self { row, sides: [Some(0), None], given_W: still, given_spin_W: still }
+    pub(super) fn alone(at: usize, row: &Row, motion: &Motion) -> Self {
+        let mut link = Self::between(at, row, [None; 2], &[]);
+        link.sides[0] = Some(0);
+        link.add(0, row, motion);
+        link
     }
 
     /// Between bodies whose places these are; the others go on as they do.
     pub(super) fn between(at: usize, row: &Row, sides: [Option<usize>; 2], motions: &[Motion]) -> Self {
-        let mut link = Self { sides, ..Self::alone(at) };
+        let still = Vector3::zeros();
+        let (most_give, most_turn, arms_m) = (0.0, 0.0, [0.0; 2]);
+        let mut link =
+            Self { row: at, sides, given_W: still, given_spin_W: still, most_give, most_turn, arms_m };
         for (side, body) in [Some(row.body), row.other].into_iter().enumerate() {
-            if let (None, Some(body)) = (sides[side], body) {
-                link.given_W += motions[body].at(&row.arms_W[side]) * SIGNS[side];
-                link.given_spin_W += motions[body].angular_velocity_W * SIGNS[side];
+            match (sides[side], body.and_then(|body| motions.get(body))) {
+                (Some(_), Some(motion)) => link.add(side, row, motion),
+                (None, Some(motion)) => {
+                    link.given_W += motion.at(&row.arms_W[side]) * SIGNS[side];
+                    link.given_spin_W += motion.angular_velocity_W * SIGNS[side];
+                }
+                _ => {}
             }
         }
         link
+    }
+
+    fn add(&mut self, side: usize, row: &Row, motion: &Motion) {
+        let arm_m2 = row.arms_W[side].norm_squared();
+        let turns = motion.inverse_inertia_W.trace();
+        self.arms_m[side] = arm_m2.sqrt();
+        self.most_give += motion.inverse_mass + arm_m2 * turns;
+        self.most_turn += turns;
     }
 
     /// The places of the sides that are solved for, with which side each is.
@@ -63,32 +86,12 @@ impl Link {
         })
     }
 
-    /// The most velocity that an impulse gives to the point, in whatever direction (1/kg).
+    /// How fast the point goes and turns at most, all sides' roundings counted (m/s), of bodies that go (m/s) and turn
+    /// (rad/s) so fast.
     #[inline]
-    pub(super) fn most_give(&self, row: &Row, moving: &[Motion]) -> f64 {
-        self.inside()
-            .map(|(side, place)| {
-                let (motion, arm_W) = (&moving[place], &row.arms_W[side]);
-                motion.inverse_mass + arm_W.norm_squared() * motion.inverse_inertia_W.trace()
-            })
-            .sum()
-    }
-
-    /// The most spin that an angular impulse gives, in whatever direction (1/(kg m^2)).
-    #[inline]
-    pub(super) fn most_turn(&self, moving: &[Motion]) -> f64 {
-        self.inside().map(|(_, place)| moving[place].inverse_inertia_W.trace()).sum()
-    }
-
-    /// How fast the point goes and turns at most, all sides' roundings counted (m/s).
-    #[inline]
-    pub(super) fn speed_m_s(&self, row: &Row, moving: &[Motion]) -> f64 {
-        self.inside()
-            .map(|(side, place)| {
-                let (motion, arm_W) = (&moving[place], &row.arms_W[side]);
-                motion.velocity_W.norm() + motion.angular_velocity_W.norm() * arm_W.norm()
-            })
-            .sum()
+    pub(super) fn speed_m_s(&self, speeds: &[[f64; 2]]) -> f64 {
+        let of_side = |(side, place): (usize, usize)| speeds[place][0] + speeds[place][1] * self.arms_m[side];
+        self.inside().map(of_side).sum()
     }
 
     /// Gives an angular impulse to both sides (N m s).
@@ -101,8 +104,8 @@ impl Link {
 
     /// Sum of the sides' spins, which bounds their roundings (rad/s).
     #[inline]
-    pub(super) fn most_spin_rad_s(&self, moving: &[Motion]) -> f64 {
-        self.inside().map(|(_, place)| moving[place].angular_velocity_W.norm()).sum()
+    pub(super) fn most_spin_rad_s(&self, speeds: &[[f64; 2]]) -> f64 {
+        self.inside().map(|(_, place)| speeds[place][1]).sum()
     }
 
     /// What spin about the normal an angular impulse about it gives (1/(kg m^2)).

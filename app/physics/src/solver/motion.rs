@@ -54,9 +54,9 @@ impl Motion {
 
     #[inline]
     pub(super) fn is_finite(&self) -> bool {
-        let vectors = [&self.velocity_W, &self.angular_velocity_W];
-        vectors.iter().all(|v| v.iter().all(|x| x.is_finite()))
-            && self.inverse_mass.is_finite()
-            && self.inverse_inertia_W.iter().all(|x| x.is_finite())
+        let Self { velocity_W, angular_velocity_W, inverse_mass, inverse_inertia_W } = self;
+        // Zero times what is no number, or infinite, is no number.
+        let zero = (velocity_W * 0.0 + angular_velocity_W * 0.0).sum() + (inverse_inertia_W * 0.0).sum();
+        zero + inverse_mass * 0.0 == 0.0
     }
 }

@@ -83,7 +83,7 @@ impl Newton {
         dt_s: f64,
     ) -> Solved {
         self.links.clear();
-        self.links.extend(which.iter().map(|&at| Link::alone(at)));
+        self.links.extend(which.iter().map(|&at| Link::alone(at, &rows[at], motion)));
         self.starts.clear();
         self.starts.push(*motion);
         self.blocks.plan(1, std::iter::empty());
@@ -153,11 +153,10 @@ impl Search<'_> {
             row.begin_torque();
         }
         self.equations.impulses(rows, self.now);
+        self.equations.evaluate(rows, self.now);
         self.go_on(rows, fall_W);
         let is_found = self.find(rows);
-        if is_found {
-            self.equations.settle(rows, &self.now.moving);
-        } else {
+        if !is_found {
             self.make_do(rows);
         }
         let solved =
@@ -173,7 +172,6 @@ impl Search<'_> {
         if *fall_W == Vector3::zeros() {
             return;
         }
-        self.equations.evaluate(rows, self.now, 1.0);
         if self.now.is_within(SOLVED) {
             return;
         }
@@ -183,23 +181,23 @@ impl Search<'_> {
         };
         self.next.p.clear();
         self.next.p.extend(self.equations.starts.iter().map(back));
-        self.equations.evaluate(rows, self.next, 1.0);
+        self.equations.evaluate(rows, self.next);
         if self.next.left_j < self.now.left_j {
             std::mem::swap(self.now, self.next);
         }
     }
 
-    /// Says whether there is an answer, at `now`.
+    /// Says whether there is an answer, at `now`, and then in the rows.
     fn find(&mut self, rows: &mut [Row]) -> bool {
         let mut turns = 0;
         loop {
-            let is_solved = self.approach(rows, 1.0)
-                || self.hold(rows, Begin::Here)
-                || self.hold(rows, Begin::FromNothing);
+            let is_solved =
+                self.approach(rows) || self.hold(rows, Begin::Here) || self.hold(rows, Begin::FromNothing);
             if is_solved && !self.equations.let_slip(rows, &self.now.moving) {
                 return true;
             }
             if is_solved {
+                self.equations.evaluate(rows, self.now);
                 continue;
             }
             if self.rounds >= self.most_rounds || turns > self.most_turns() {
@@ -208,6 +206,7 @@ impl Search<'_> {
             turns = (2 * turns).max(FIRST_TURNS);
             self.equations.settle(rows, &self.now.moving);
             self.relax(rows, turns);
+            self.equations.evaluate(rows, self.now);
         }
     }
 
@@ -216,7 +215,8 @@ impl Search<'_> {
         let rounds = MOST_HELD.min(self.most_rounds.saturating_sub(self.rounds));
         let Self { equations, now, next, change, blocks, holds_n, .. } = self;
         self.rounds += Hold { now, next, change, blocks }.run(equations, rows, begin, holds_n, rounds);
-        self.approach(rows, 1.0)
+        self.equations.evaluate(rows, self.now);
+        self.approach(rows)
     }
 
     /// Not what was sought, but forces that contacts can have.
@@ -226,7 +226,7 @@ impl Search<'_> {
             rows[link.row].silence();
         }
         self.relax(rows, self.most_turns());
-        self.equations.evaluate(rows, self.now, 1.0);
+        self.equations.evaluate(rows, self.now);
     }
 
     /// As many turns at once as there is time for.
@@ -234,9 +234,8 @@ impl Search<'_> {
         (MOST_VISITS / self.equations.links.len().max(1)).clamp(FIRST_TURNS, MOST_TURNS)
     }
 
-    /// Newton's steps until it is solved, when that is said, or nothing brings it nearer.
-    fn approach(&mut self, rows: &[Row], load: f64) -> bool {
-        self.equations.evaluate(rows, self.now, load);
+    /// Newton's steps from `now`, as it was evaluated, until it is solved, when that is said, or nothing brings it nearer.
+    fn approach(&mut self, rows: &[Row]) -> bool {
         if self.now.is_within(SOLVED) {
             // What rests does as in the last tick.
             return true;
@@ -248,11 +247,11 @@ impl Search<'_> {
         while self.rounds < most_rounds {
             self.rounds += 1;
             let was_j = self.now.left_j;
-            if !self.step(rows, load) {
+            if !self.step(rows) {
                 if self.now.is_within(NEARLY_SOLVED) {
                     return true;
                 }
-                if leaps == most_leaps || !self.leap(rows, load, leaps) {
+                if leaps == most_leaps || !self.leap(rows, leaps) {
                     break;
                 }
                 leaps += 1;
@@ -272,13 +271,13 @@ impl Search<'_> {
 
     /// Goes all of the step though that leads farther away: behind where many points change at once it may be near. Remembers
     /// the best place so far. Says whether there is such a step.
-    fn leap(&mut self, rows: &[Row], load: f64, leaps: usize) -> bool {
-        if !self.direction(rows, load, false) {
+    fn leap(&mut self, rows: &[Row], leaps: usize) -> bool {
+        if !self.direction(rows, false) {
             return false;
         }
         self.next.p.clear();
         self.next.p.extend(self.now.p.iter().zip(&*self.change).map(|(p, change)| p - change));
-        self.equations.evaluate(rows, self.next, load);
+        self.equations.evaluate(rows, self.next);
         if leaps == 0 || self.now.left_j < self.best.left_j {
             std::mem::swap(self.best, self.now);
         }
@@ -295,21 +294,21 @@ impl Search<'_> {
     }
 
     /// A step of Newton's that brings it nearer; says whether there is one.
-    fn step(&mut self, rows: &[Row], load: f64) -> bool {
-        if !self.direction(rows, load, false) {
+    fn step(&mut self, rows: &[Row]) -> bool {
+        if !self.direction(rows, false) {
             return false;
         }
         let mut share = 1.0;
         for halvings in 0..=HALVINGS {
             if halvings == 1 && self.is_at_limit(rows) {
-                if self.direction(rows, load, true) && self.goes(rows, load, 1.0, 1e-3) {
+                if self.direction(rows, true) && self.goes(rows, 1.0, 1e-3) {
                     return true;
                 }
-                if !self.direction(rows, load, false) {
+                if !self.direction(rows, false) {
                     return false;
                 }
             }
-            if self.goes(rows, load, share, 1e-3 * share) {
+            if self.goes(rows, share, 1e-3 * share) {
                 return true;
             }
             share *= 0.5;
@@ -318,10 +317,10 @@ impl Search<'_> {
     }
 
     /// Goes by this share of the change, if that lessens what is left by so much of it; says whether.
-    fn goes(&mut self, rows: &[Row], load: f64, share: f64, lessens: f64) -> bool {
+    fn goes(&mut self, rows: &[Row], share: f64, lessens: f64) -> bool {
         self.next.p.clear();
         self.next.p.extend(self.now.p.iter().zip(&*self.change).map(|(p, change)| p - change * share));
-        self.equations.evaluate(rows, self.next, load);
+        self.equations.evaluate(rows, self.next);
         let is_nearer = self.next.left_j < (1.0 - lessens) * self.now.left_j || self.next.left_j == 0.0;
         if is_nearer {
             std::mem::swap(self.now, self.next);
@@ -330,8 +329,8 @@ impl Search<'_> {
     }
 
     /// Where to, by the derivative where it stands; says whether that is anywhere.
-    fn direction(&mut self, rows: &[Row], load: f64, chords: bool) -> bool {
-        self.equations.derive(rows, &self.now.moving, load, chords, self.blocks);
+    fn direction(&mut self, rows: &[Row], chords: bool) -> bool {
+        self.equations.derive(rows, &self.now.moving, chords, self.blocks);
         self.change.clear();
         self.change.extend_from_slice(&self.now.left);
         self.blocks.solve(self.change)

@@ -10,7 +10,7 @@ pub(super) fn turns(equations: &Equations<'_>, rows: &mut [Row], moving: &mut [M
     let dt_s = equations.dt_s;
     for link in (0..turns).flat_map(|_| equations.links) {
         let row = &mut rows[link.row];
-        let most_give = link.most_give(row, moving);
+        let most_give = link.most_give;
         let [along, across] = row.falls(dt_s).map(|falls| 1.0 / (1.0 + falls * most_give * dt_s));
         let missing_W = row.trial_at_end_W(&link.velocity_W(row, moving), dt_s) - row.force_W;
         let missing_n = row.normal_W.dot(&missing_W);
@@ -26,7 +26,7 @@ pub(super) fn turns(equations: &Equations<'_>, rows: &mut [Row], moving: &mut [M
             row.torsion.torque_nm += change_nm;
             link.turn(&(row.normal_W * (change_nm * dt_s)), moving);
             let asked_W = row.turning_at_end(&link.spin_W(moving), dt_s, presses_n).1;
-            let share = 1.0 / (1.0 + row.rolling.falls(dt_s) * link.most_turn(moving) * dt_s);
+            let share = 1.0 / (1.0 + row.rolling.falls(dt_s) * link.most_turn * dt_s);
             let change_W = (asked_W - row.rolling.torque_W) * share;
             row.rolling.torque_W += change_W;
             link.turn(&(change_W * dt_s), moving);
