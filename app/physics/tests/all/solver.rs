@@ -308,10 +308,30 @@ fn rows_that_are_no_numbers_press_nothing_and_disturb_nobody() {
             assert_eq!(rows[(rows.len() - 1) / 2].force_W, Vector3::zeros());
         }
     }
-    let (mut body, mut rows) = scene(1);
-    body.velocity_W.x = f64::NAN;
-    solver.solve(&mut rows, &mut [body], DT);
-    assert!(rows.iter().all(|row| row.force_W == Vector3::zeros()), "a lost body is not pressed");
+}
+
+#[test]
+fn bodies_that_are_no_numbers_are_not_pressed_and_press_nobody() {
+    let broken: [&dyn Fn(&mut Motion); 4] = [
+        &|body| body.velocity_W.x = f64::NAN,
+        &|body| body.angular_velocity_W.y = f64::INFINITY,
+        &|body| body.inverse_mass = f64::NAN,
+        &|body| body.inverse_inertia_W[(2, 1)] = f64::NEG_INFINITY,
+    ];
+    for (seed, change) in broken.into_iter().enumerate() {
+        let (body, rows) = scene(seed as u64);
+        let mut alone = (rows.clone(), [body]);
+        Solver::with_capacity(64, 1).solve(&mut alone.0, &mut alone.1, DT);
+        let mut lost = body;
+        change(&mut lost);
+        let mut beside = rows.clone();
+        beside.push(Row { other: Some(1), ..rows[0] });
+        beside.extend(rows.iter().map(|row| Row { body: 1, ..*row }));
+        let mut motions = [body, lost];
+        Solver::with_capacity(64, 2).solve(&mut beside, &mut motions, DT);
+        assert_eq!(motions[0], alone.1[0]);
+        assert!(beside[rows.len()..].iter().all(|row| row.force_W == Vector3::zeros()), "{seed}");
+    }
 }
 
 #[test]
