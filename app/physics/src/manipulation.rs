@@ -59,9 +59,9 @@ pub struct Manipulation {
     entities: Vec<usize>,
     rows: Vec<Row>,
     motions: Vec<Motion>,
+    /// By how much each of them changes its motion in the tick without contacts.
+    changes: Vec<Motion>,
     speeds_m_s: Vec<f64>,
-    /// How each of them turns when the tick begins \[rad/s\].
-    spins_W: Vec<Vector3<f64>>,
     /// Of each body, what a tick took from it \[J\].
     spare_j: Vec<f64>,
     solver: Solver,
@@ -147,12 +147,12 @@ impl Manipulation {
             entities: Vec::with_capacity(places),
             rows: Vec::with_capacity(room),
             motions: Vec::with_capacity(places),
+            changes: Vec::with_capacity(places),
             speeds_m_s: Vec::with_capacity(places),
-            spins_W: Vec::with_capacity(places),
             spare_j: Vec::with_capacity(places),
             solver: Solver::with_capacity(room, places),
             hand: Hand::new(&[], count),
-            restitution: Restitution::with_capacity(room, places),
+            restitution: Restitution::with_capacity(room),
             sets: Sets::with_capacity(count),
             touching: 0,
             pressing: 0,
@@ -189,7 +189,7 @@ impl Manipulation {
         self.rows = Vec::with_capacity(room);
         self.solver = Solver::with_capacity(room, places);
         self.stages = Stages::with_capacity(room, places);
-        self.restitution = Restitution::with_capacity(room, places);
+        self.restitution = Restitution::with_capacity(room);
         self.fixed = Vec::with_capacity(room);
         self
     }

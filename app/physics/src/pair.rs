@@ -72,10 +72,10 @@ pub(crate) struct Start<'t> {
     pub(crate) bodies: &'t [Body],
     /// As they are without contacts, at the end of the tick.
     pub(crate) motions: &'t [Motion],
+    /// What of that the tick adds to what they were.
+    pub(crate) changes: &'t [Motion],
     /// The most that any point of each moves per time \[m/s\].
     pub(crate) speeds_m_s: &'t [f64],
-    /// How each turns when the tick begins \[rad/s\].
-    pub(crate) spins_W: &'t [Vector3<f64>],
     pub(crate) dt_s: f64,
     /// Whether forces are those of the end of the tick.
     pub(crate) is_implicit: bool,

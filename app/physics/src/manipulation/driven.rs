@@ -75,10 +75,10 @@ impl Manipulation {
         for &Driven { entity, to_W } in &self.driven {
             let (body, motion) = carrier(&entities[entity].X_WB, &to_W, dt_s);
             self.speeds_m_s.push(fastest_point_m_s(&entities[entity], &body, &motion));
-            self.spins_W.push(body.angular_velocity_W());
             self.bodies.push(body);
             self.entities.push(entity);
             self.motions.push(motion);
+            self.changes.push(Motion::NONE);
         }
     }
 

@@ -41,7 +41,7 @@ impl Manipulation {
         let solved = self.restitution.solve(
             &mut self.solver,
             &mut self.rows,
-            &mut self.motions,
+            (&mut self.motions, &self.changes),
             (&self.settings.gravity_W, dt_s),
         );
         explicit::release(&mut self.rows, &mut self.fixed);

@@ -21,17 +21,20 @@ impl Manipulation {
         self.bodies.clear();
         self.entities.clear();
         self.motions.clear();
+        self.changes.clear();
         self.speeds_m_s.clear();
-        self.spins_W.clear();
         let fall_W = self.settings.gravity_W * dt_s;
         for &number in self.roster.awake() {
             let (body, entity) = (self.roster.bodies[number], self.roster.entities[number]);
             let mut motion = moving(&body);
-            self.spins_W.push(motion.angular_velocity_W);
+            let mut change = Motion { velocity_W: fall_W, ..Motion::NONE };
             motion.velocity_W += fall_W;
             if self.settings.integrator.is_implicit() {
-                motion.angular_velocity_W = mean_angular_velocity_W(&body, dt_s);
+                let mean_W = mean_angular_velocity_W(&body, dt_s);
+                change.angular_velocity_W = mean_W - motion.angular_velocity_W;
+                motion.angular_velocity_W = mean_W;
             }
+            self.changes.push(change);
             self.speeds_m_s.push(fastest_point_m_s(&entities[entity], &body, &motion));
             self.bodies.push(body);
             self.entities.push(entity);
@@ -101,8 +104,8 @@ impl Manipulation {
                 entities,
                 bodies: &self.bodies,
                 motions: &self.motions,
+                changes: &self.changes,
                 speeds_m_s: &self.speeds_m_s,
-                spins_W: &self.spins_W,
                 dt_s,
                 is_implicit: self.settings.integrator.is_implicit(),
             };
@@ -157,10 +160,10 @@ impl Manipulation {
         let still = Body { velocity_W: zero, angular_momentum_W: zero, ..self.roster.bodies[number] };
         let inverse_inertia_W = nalgebra::Matrix3::zeros();
         self.motions.push(Motion { inverse_mass: 0.0, inverse_inertia_W, ..moving(&still) });
+        self.changes.push(Motion::NONE);
         self.bodies.push(still);
         self.entities.push(entity);
         self.speeds_m_s.push(0.0);
-        self.spins_W.push(zero);
         self.entities.len() - 1
     }
 }

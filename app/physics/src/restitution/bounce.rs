@@ -9,7 +9,6 @@
 //! work on the body is the root of a quadratic equation. The work of an impulse P is that with the mean of the velocities
 //! before and after it. Gravity changes both within the tick, while the body goes on with the velocity of the tick's end: of
 //! kinetic energy and height together, `P (v_0 - g dt + v_1) / 2 - m (g dt)^2 / 2` is what contacts put in.
-//! What stops beside the bounce counts as well: thrown from one wall of a wedge onto the other, a body is pushed by both.
 //! Invariant: forces and velocities still belong together, and forces on users are still those that bodies got.
 //! Cost: a second solution, in ticks with an impact that gives energy only.
 
@@ -17,40 +16,17 @@ use nalgebra::Vector3;
 
 use super::velocity;
 use crate::row::Row;
-use crate::solver::{Motion, Solved, Solver};
+use crate::solver::{Motion, Solver};
 
 /// Room for both solutions.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Bounce {
     freely: Vec<Motion>,
     bouncing: Vec<Motion>,
-    /// Of each row: force, torques of torsion and of rolling.
-    forces: Vec<(Vector3<f64>, f64, Vector3<f64>)>,
+    /// Of each row, with the full bounce.
+    forces_W: Vec<Vector3<f64>>,
     /// Of each body, how much of the bounce it gets.
     shares: Vec<f64>,
-    /// What gravity changes velocities by in the tick \[m/s\].
-    fall_W: Vector3<f64>,
-}
-
-/// Rows of the impulse response.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Impulses<'a> {
-    /// Those that meet what they touch.
-    pub(super) impacts: &'a [usize],
-    /// The others, which stop.
-    pub(super) stops: &'a [usize],
-}
-
-impl Impulses<'_> {
-    fn all(&self) -> impl Iterator<Item = usize> + use<'_> {
-        self.impacts.iter().chain(self.stops).copied()
-    }
-}
-
-/// What of a force is an impulse's: not what springs across the normal of a contact that stays do.
-fn impulse_W(row: &Row, force_W: &Vector3<f64>, dt_s: f64) -> Vector3<f64> {
-    let is_impulse = row.stiffness[1] == row.damping[0] / dt_s;
-    if is_impulse { *force_W } else { row.normal_W * row.normal_W.dot(force_W) }
 }
 
 impl Bounce {
@@ -58,84 +34,69 @@ impl Bounce {
         Self {
             freely: Vec::with_capacity(bodies),
             bouncing: Vec::with_capacity(bodies),
-            forces: Vec::with_capacity(rows),
+            forces_W: Vec::with_capacity(rows),
             shares: Vec::with_capacity(bodies),
-            fall_W: Vector3::zeros(),
         }
     }
 
-    /// Solves for all rows' forces such that the impulses give no energy.
+    /// Solves for the forces of rows that are all reflected, such that they give no energy.
     pub(super) fn solve(
         &mut self,
         solver: &mut Solver,
         rows: &mut [Row],
-        impulses: Impulses<'_>,
         motions: &mut [Motion],
-        (fall_W, dt_s): (&Vector3<f64>, f64),
-    ) -> Solved {
-        self.fall_W = *fall_W;
+        (changes, dt_s): (&[Motion], f64),
+    ) {
         self.freely.clear();
         self.freely.extend_from_slice(motions);
-        let solved = solver.solve(rows, motions, dt_s);
-        if impulses.impacts.is_empty() || !self.gives_energy(rows, impulses, motions, dt_s) {
-            return solved;
+        solver.solve(rows, motions, dt_s);
+        if !self.gives_energy(rows, motions, (changes, dt_s)) {
+            return;
         }
         self.bouncing.clear();
         self.bouncing.extend_from_slice(motions);
-        self.forces.clear();
-        self.forces.extend(rows.iter().map(|row| (row.force_W, row.torsion.torque_nm, row.rolling.torque_W)));
+        self.forces_W.clear();
+        self.forces_W.extend(rows.iter().map(|row| row.force_W));
         motions.copy_from_slice(&self.freely);
-        for &at in impulses.impacts {
-            let row = &mut rows[at];
+        for row in rows.iter_mut() {
             let rest_n = row.normal_W.dot(&row.rest_W);
             row.rest_W -= row.normal_W * rest_n.max(0.0);
         }
-        let more = solver.solve(rows, motions, dt_s);
-        self.find_shares(rows, impulses, motions, dt_s);
+        solver.solve(rows, motions, dt_s);
+        self.find_shares(rows, motions, (changes, dt_s));
         self.mix(rows, motions);
-        Solved { sweeps: solved.sweeps + more.sweeps, ..solved.and(more) }
     }
 
     /// Whether the impulses of any body work on it.
-    fn gives_energy(&mut self, rows: &[Row], impulses: Impulses<'_>, motions: &[Motion], dt_s: f64) -> bool {
+    fn gives_energy(&mut self, rows: &[Row], motions: &[Motion], (changes, dt_s): (&[Motion], f64)) -> bool {
         self.shares.clear();
         self.shares.resize(motions.len(), 0.0);
-        for at in impulses.all() {
-            let row = &rows[at];
-            let work = impulse_W(row, &row.force_W, dt_s).dot(&(self.before_W(row) + velocity(row, motions)));
+        for row in rows {
+            let work = row.force_W.dot(&(self.before_W(row, changes) + velocity(row, motions)));
             self.shares[row.body] += work;
             if let Some(other) = row.other {
                 self.shares[other] += work;
             }
         }
-        let mut all = self.shares.iter().zip(motions);
-        all.any(|(work, motion)| *work > self.free_w(motion, dt_s))
+        let mut all = self.shares.iter().zip(motions.iter().zip(changes));
+        all.any(|(work, (motion, change))| *work > free_w(motion, change, dt_s))
     }
 
     /// How fast the contact point would have to move before the tick for the work to be that of both ends' mean.
-    fn before_W(&self, row: &Row) -> Vector3<f64> {
-        velocity(row, &self.freely) - self.fall_W * 2.0
-    }
-
-    /// What impulses may seem to put into a body per time, twice, for what gravity takes from it.
-    fn free_w(&self, motion: &Motion, dt_s: f64) -> f64 {
-        if motion.inverse_mass > 0.0 {
-            self.fall_W.norm_squared() / (motion.inverse_mass * dt_s)
-        } else {
-            0.0
-        }
+    fn before_W(&self, row: &Row, changes: &[Motion]) -> Vector3<f64> {
+        velocity(row, &self.freely) - velocity(row, changes) * 2.0
     }
 
     /// With `s` of the bounce, forces `f_0 + s f` and velocities `u_0 + s u` work `a + b s + c s^2`.
-    fn find_shares(&mut self, rows: &[Row], impulses: Impulses<'_>, motions: &[Motion], dt_s: f64) {
+    fn find_shares(&mut self, rows: &[Row], motions: &[Motion], (changes, dt_s): (&[Motion], f64)) {
         let mut least_coupled = 1.0_f64;
         for body in 0..motions.len() {
-            let (mut a, mut b, mut c) = (-self.free_w(&motions[body], dt_s), 0.0, 0.0);
-            for at in impulses.all().filter(|&at| rows[at].body == body || rows[at].other == Some(body)) {
-                let row = &rows[at];
-                let f_0 = impulse_W(row, &row.force_W, dt_s);
-                let f = impulse_W(row, &self.forces[at].0, dt_s) - f_0;
-                let u_0 = self.before_W(row) + velocity(row, motions);
+            let (mut a, mut b, mut c) = (-free_w(&motions[body], &changes[body], dt_s), 0.0, 0.0);
+            let own = rows.iter().zip(&self.forces_W);
+            for (row, force_W) in own.filter(|(row, _)| row.body == body || row.other == Some(body)) {
+                let f_0 = row.force_W;
+                let f = force_W - f_0;
+                let u_0 = self.before_W(row, changes) + velocity(row, motions);
                 let u = velocity(row, &self.bouncing) - velocity(row, motions);
                 a += f_0.dot(&u_0);
                 b += f_0.dot(&u) + f.dot(&u_0);
@@ -158,16 +119,22 @@ impl Bounce {
     }
 
     fn mix(&self, rows: &mut [Row], motions: &mut [Motion]) {
-        for (row, (force_W, torque_nm, rolling_W)) in rows.iter_mut().zip(&self.forces) {
-            let share = self.shares[row.body];
-            row.force_W += (force_W - row.force_W) * share;
-            row.torsion.torque_nm += (torque_nm - row.torsion.torque_nm) * share;
-            row.rolling.torque_W += (rolling_W - row.rolling.torque_W) * share;
+        for (row, force_W) in rows.iter_mut().zip(&self.forces_W) {
+            row.force_W += (force_W - row.force_W) * self.shares[row.body];
         }
         for ((motion, bouncing), share) in motions.iter_mut().zip(&self.bouncing).zip(&self.shares) {
             motion.velocity_W += (bouncing.velocity_W - motion.velocity_W) * *share;
             motion.angular_velocity_W += (bouncing.angular_velocity_W - motion.angular_velocity_W) * *share;
         }
+    }
+}
+
+/// What impulses may seem to put into a body per time, twice, for what gravity takes from it.
+fn free_w(motion: &Motion, change: &Motion, dt_s: f64) -> f64 {
+    if motion.inverse_mass > 0.0 {
+        change.velocity_W.norm_squared() / (motion.inverse_mass * dt_s)
+    } else {
+        0.0
     }
 }
 

@@ -5,15 +5,19 @@
 //!
 //! Model: of all points that approach and close within the tick, the one that closes first (of several at once, the fastest)
 //! tells which two meet; until then all gaps have become what they are by that time. All points of the two are reflected together
-//! ([`Bounce`]), with friction and without a gain of energy, while everybody else goes on; then the next two meet, until nobody approaches. Impulses in a row that lose energy each time
-//! need not end; what still approaches after [`MAX_MEETINGS`] is stopped with all other forces of the tick. Without
-//! any bounce (e = 0) nothing has to be in order, and all of it is left to them.
+//! ([`Bounce`]) that meet, with friction and without a gain of energy, while everybody else goes on; then the next two meet, until
+//! nobody approaches. So of a box that lands on an edge one corner comes after the other, as often as it takes, and nothing is
+//! lost. Impulses in a row that lose energy each time need not end; what still approaches after [`MAX_MEETINGS`] is stopped
+//! with all other forces of the tick, as is what does not bounce. Without any bounce (e = 0) nothing has to be in order, and
+//! all of it is left to them.
+//! A body alone leaves as [`Meeting`] has it, from where it is; among many the time passes that they take.
 //! Invariant: what one gets the other gives, at the same point: momentum and angular momentum of the two are kept.
 //! Cost: a solution for two bodies in each meeting, and a look at all points.
 
 use nalgebra::Vector3;
 
-use super::{Bounce, Impulses, Meeting, velocity};
+use super::bounce::Bounce;
+use super::{Meeting, velocity};
 use crate::pair::HARD;
 use crate::row::Row;
 use crate::solver::{Motion, Solver};
@@ -30,11 +34,11 @@ const ROUNDING_M: f64 = 1e-12;
 pub(super) struct Cascade {
     /// Of each row, as far as any has met \[N s\].
     impulses_W: Vec<Vector3<f64>>,
-    /// Of the two that meet now: points, which of them are reflected, and motions.
+    /// Of the two that meet now: their meetings, points and motions.
+    meet: Vec<usize>,
     rows: Vec<Row>,
-    impacts: Vec<usize>,
-    stops: Vec<usize>,
     motions: Vec<Motion>,
+    changes: Vec<Motion>,
     solver: Solver,
     bounce: Bounce,
 }
@@ -43,10 +47,10 @@ impl Cascade {
     pub(super) fn with_capacity(rows: usize) -> Self {
         Self {
             impulses_W: Vec::with_capacity(rows),
+            meet: Vec::with_capacity(MAX_POINTS),
             rows: Vec::with_capacity(MAX_POINTS),
-            impacts: Vec::with_capacity(MAX_POINTS),
-            stops: Vec::with_capacity(MAX_POINTS),
             motions: Vec::with_capacity(2),
+            changes: Vec::with_capacity(2),
             solver: Solver::with_capacity(MAX_POINTS, 2),
             bounce: Bounce::with_capacity(MAX_POINTS, 2),
         }
@@ -61,47 +65,56 @@ impl Cascade {
         self.impulses_W.get(row).is_some_and(|impulse_W| *impulse_W != Vector3::zeros())
     }
 
-    /// Lets all meet that do, and moves them on; rows that have met go on with an impulse's friction.
+    /// Lets all meet that do, and moves them on; rows that have met, or should, go on with an impulse's friction.
     pub(super) fn run(
         &mut self,
         meetings: &mut [Meeting],
         rows: &mut [Row],
-        motions: &mut [Motion],
+        (motions, changes): (&mut [Motion], &[Motion]),
         dt_s: f64,
     ) {
-        meetings.iter_mut().for_each(|meeting| meeting.gap_m = open(meeting.gap_m));
+        let of_many = meetings.iter_mut().filter(|meeting| meeting.is_among_many);
+        of_many.for_each(|meeting| meeting.gap_m = open(meeting.gap_m));
         for _ in 0..MAX_MEETINGS {
             let Some(two) = next(meetings, rows, motions, dt_s) else { break };
             if self.impulses_W.is_empty() {
                 self.impulses_W.resize(rows.len(), Vector3::zeros());
             }
-            self.meet(two, meetings, rows, motions, dt_s);
+            self.meet(two, meetings, rows, (motions, changes), dt_s);
         }
-        for meeting in meetings.iter().filter(|meeting| self.has_met(meeting.row)) {
-            meeting.stop(&mut rows[meeting.row], dt_s);
+        for meeting in meetings {
+            let row = &mut rows[meeting.row];
+            let has_met = self.has_met(meeting.row);
+            if has_met || meeting.meets(dt_s) {
+                meeting.stop(row, dt_s);
+            }
+            if has_met {
+                // What bounces does not roll: a torque as large as the impulse would drive it.
+                (row.torsion, row.rolling) = Default::default();
+            }
         }
     }
 
-    /// Reflects all points of two bodies, or of one and what is fixed.
+    /// Reflects all points that meet of two bodies, or of one and what is fixed.
     fn meet(
         &mut self,
         (body, other): (usize, Option<usize>),
-        meetings: &[Meeting],
+        meetings: &mut [Meeting],
         rows: &[Row],
-        motions: &mut [Motion],
+        (motions, changes): (&mut [Motion], &[Motion]),
         dt_s: f64,
     ) {
-        self.gather((body, other), meetings, rows, motions, dt_s);
-        self.bounce.solve(
-            &mut self.solver,
-            &mut self.rows,
-            Impulses { impacts: &self.impacts, stops: &self.stops },
-            &mut self.motions,
-            (&Vector3::zeros(), dt_s),
-        );
-        let solved = meetings.iter().filter(|meeting| is_of(&rows[meeting.row], body, other));
-        for (meeting, row) in solved.zip(&self.rows) {
-            self.impulses_W[meeting.row] += row.force_W * dt_s;
+        let are_many = self.gather((body, other), meetings, rows, motions, dt_s);
+        let both = [Some(body), other].into_iter().flatten();
+        self.changes.clear();
+        self.changes.extend(both.map(|body| changes[body]));
+        if are_many {
+            self.changes.iter_mut().for_each(|change| change.velocity_W = Vector3::zeros());
+        }
+        self.bounce.solve(&mut self.solver, &mut self.rows, &mut self.motions, (&self.changes, dt_s));
+        for (&at, row) in self.meet.iter().zip(&self.rows) {
+            self.impulses_W[meetings[at].row] += row.force_W * dt_s;
+            meetings[at].has_met();
         }
         let moved = [Some(body), other.filter(|&other| motions[other].is_movable())];
         for (body, motion) in moved.into_iter().flatten().zip(&self.motions) {
@@ -109,7 +122,7 @@ impl Cascade {
         }
     }
 
-    /// Takes both bodies and their points: those that meet are reflected, the others held back where they are.
+    /// Takes both bodies and their points that meet; says whether they are among many.
     fn gather(
         &mut self,
         (body, other): (usize, Option<usize>),
@@ -117,29 +130,31 @@ impl Cascade {
         rows: &[Row],
         motions: &[Motion],
         dt_s: f64,
-    ) {
+    ) -> bool {
         self.motions.clear();
         self.motions.push(motions[body]);
         self.motions.extend(other.map(|other| motions[other]));
         self.rows.clear();
-        self.impacts.clear();
-        self.stops.clear();
-        for meeting in
-            meetings.iter().filter(|meeting| is_of(&rows[meeting.row], body, other)).take(MAX_POINTS)
-        {
+        self.meet.clear();
+        let mut are_many = false;
+        let own = meetings.iter().enumerate().filter(|(_, meeting)| is_of(&rows[meeting.row], body, other));
+        for (at, meeting) in own {
+            let Some(leaves_m_s) = meeting.leaves_m_s(dt_s).filter(|_| meeting.bounces()) else { continue };
+            if self.meet.len() == MAX_POINTS {
+                break;
+            }
+            are_many |= meeting.is_among_many;
             let was = &rows[meeting.row];
             let n = was.normal_W;
             let mut row = Row { body: 0, other: other.map(|_| 1), force_W: Vector3::zeros(), ..*was };
             (row.torsion, row.rolling) = Default::default();
-            let leaves_m_s = meeting.leaves_m_s(dt_s);
-            // What is stopped gives way by a part in so many: that much more is asked for.
-            let freely_m_s = n.dot(&velocity(was, motions));
-            let more = |m_s: f64| m_s + (m_s - freely_m_s) / HARD;
-            meeting.reflect(&mut row, leaves_m_s.map_or(-meeting.gap_m / dt_s, more), dt_s);
-            let kind = if leaves_m_s.is_some() { &mut self.impacts } else { &mut self.stops };
-            kind.push(self.rows.len());
+            // What is stopped gives way by a part in so many: that much more is asked for, of what is passed on.
+            let lacks_m_s = (leaves_m_s - n.dot(&velocity(was, motions))) / HARD;
+            meeting.reflect(&mut row, leaves_m_s + if other.is_some() { lacks_m_s } else { 0.0 }, dt_s);
+            self.meet.push(at);
             self.rows.push(row);
         }
+        are_many
     }
 
     /// Adds what was given to the forces of the tick.
@@ -156,16 +171,16 @@ fn next(
     dt_s: f64,
 ) -> Option<(usize, Option<usize>)> {
     let mut first: Option<([f64; 2], &Row)> = None;
-    for meeting in meetings.iter_mut().filter(|meeting| meeting.is_among_many && meeting.bounces()) {
+    for meeting in meetings.iter_mut().filter(|meeting| meeting.bounces()) {
         let row = &rows[meeting.row];
         meeting.look(row, motions);
-        if meeting.meets(dt_s) {
+        if meeting.leaves_m_s(dt_s).is_some() {
             let order = [meeting.gap_m / meeting.approaches_m_s, -meeting.approaches_m_s];
             first = first.filter(|(least, _)| *least <= order).or(Some((order, row)));
         }
     }
     let ([after_s, _], row) = first?;
-    for meeting in meetings {
+    for meeting in meetings.iter_mut().filter(|meeting| meeting.is_among_many) {
         meeting.gap_m = open(meeting.gap_m - meeting.approaches_m_s * after_s);
     }
     Some((row.body, row.other))

@@ -42,6 +42,8 @@ pub(crate) struct Meeting {
     pub(super) approaches_m_s: f64,
     /// By how much its normal velocity grows in the tick without any contact \[m/s\].
     grows_m_s: f64,
+    /// What of that is gravity, against the normal \[m/s\].
+    falls_m_s: f64,
     /// What approaches no faster rests \[m/s\].
     calm_m_s: f64,
     /// It was pushed back before it got off.
@@ -63,11 +65,13 @@ impl Meeting {
     ) -> Self {
         let gap_m = -anchor.pressed_m;
         let along = |velocity_W: &Vector3<f64>| row.normal_W.dot(velocity_W);
-        let (now_m_s, freely_m_s) = (along(&at_start(row, start)), along(&velocity(row, start.motions)));
-        let grows_m_s = freely_m_s - now_m_s;
-        let calm_m_s = row.other.map_or((-grows_m_s).max(0.0), |other| {
-            let fall = |body: usize| (start.motions[body].velocity_W - start.bodies[body].velocity_W).norm();
-            fall(row.body).max(fall(other)).max(CALM_M_S)
+        let (freely_m_s, grows_m_s) =
+            (along(&velocity(row, start.motions)), along(&velocity(row, start.changes)));
+        let now_m_s = freely_m_s - grows_m_s;
+        let fall_W = |body: usize| start.changes[body].velocity_W;
+        let falls_m_s = -along(&(fall_W(row.body) - row.other.map_or(Vector3::zeros(), fall_W)));
+        let calm_m_s = row.other.map_or(falls_m_s.max(0.0), |other| {
+            fall_W(row.body).norm().max(fall_W(other).norm()).max(CALM_M_S)
         });
         // So slowly a spring takes it without a bounce that anybody sees; beside a wall gravity calms nothing.
         let calm_m_s = if stop.is_always { calm_m_s } else { calm_m_s.max(SLOW_M_S) };
@@ -88,6 +92,7 @@ impl Meeting {
             restitution,
             approaches_m_s: -now_m_s,
             grows_m_s,
+            falls_m_s,
             calm_m_s,
             is_held,
             stops_m_s,
@@ -102,6 +107,11 @@ impl Meeting {
 
     pub(super) fn bounces(&self) -> bool {
         self.restitution > 0.0
+    }
+
+    /// It has met: what was owed to it is paid.
+    pub(super) fn has_met(&mut self) {
+        self.owed_m_s = 0.0;
     }
 
     /// Takes note of how fast it approaches with these motions at the end of the tick.
@@ -126,7 +136,7 @@ impl Meeting {
 
     /// Its speed where they touch.
     fn meets_at_m_s(&self, dt_s: f64) -> f64 {
-        let falls_m_s2 = -self.grows_m_s / dt_s;
+        let falls_m_s2 = self.falls_m_s / dt_s;
         let squared = self.approaches_m_s.powi(2) + 2.0 * falls_m_s2 * self.gap_m.max(0.0);
         if self.owed_m_s > 0.0 { self.owed_m_s } else { squared.max(0.0).sqrt() }
     }
@@ -134,13 +144,14 @@ impl Meeting {
     fn leaves(&self, dt_s: f64) -> Leaves {
         //= melder#6.1
         let back_m_s = self.restitution * self.meets_at_m_s(dt_s);
-        let falls_m_s = -self.grows_m_s;
+        let falls_m_s = self.falls_m_s;
         if back_m_s <= falls_m_s.max(0.0) {
             return Leaves::Not;
         }
         let gap_m = if self.owed_m_s > 0.0 { self.gap_m } else { self.gap_m.max(0.0) };
         let squared = back_m_s.powi(2) - 2.0 * falls_m_s / dt_s * gap_m + falls_m_s.powi(2);
-        if squared < 0.0 { Leaves::Later } else { Leaves::With(squared.sqrt() - falls_m_s) }
+        let turns_m_s = self.grows_m_s + falls_m_s;
+        if squared < 0.0 { Leaves::Later } else { Leaves::With(squared.sqrt() - falls_m_s + turns_m_s) }
     }
 
     /// Makes the row leave with this velocity (m/s).
@@ -167,13 +178,6 @@ enum Leaves {
     With(f64),
     /// It bounces no higher than it is now: it has to come down first.
     Later,
-}
-
-/// Velocity of the body's point relative to the other's when the tick begins.
-fn at_start(row: &Row, start: &Start<'_>) -> Vector3<f64> {
-    let at =
-        |body: usize, arm_W: &Vector3<f64>| start.bodies[body].velocity_W + start.spins_W[body].cross(arm_W);
-    at(row.body, &row.arms_W[0]) - row.other.map_or(Vector3::zeros(), |other| at(other, &row.arms_W[1]))
 }
 
 /// Nearer has come down to where they touch \[m\]: what is stopped at 10 m/s is a part in a million of its tick's way short of it.

@@ -16,6 +16,14 @@ pub struct Motion {
 }
 
 impl Motion {
+    /// Of what stands still, whatever presses it.
+    pub(crate) const NONE: Self = Self {
+        velocity_W: Vector3::new(0.0, 0.0, 0.0),
+        angular_velocity_W: Vector3::new(0.0, 0.0, 0.0),
+        inverse_mass: 0.0,
+        inverse_inertia_W: Matrix3::new(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0),
+    };
+
     /// Velocity of its point at this arm \[m/s\].
     #[inline]
     pub fn at(&self, arm_W: &Vector3<f64>) -> Vector3<f64> {
