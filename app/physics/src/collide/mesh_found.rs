@@ -14,7 +14,6 @@ use super::mesh_patch::MAX_PATCHES;
 use super::{MAX_POINTS, PATCH_POINTS};
 
 pub(super) struct Found {
-    are_meshes: bool,
     contacts: [Contact; ROOM],
     count: usize,
     /// Where each place's begin.
@@ -28,9 +27,8 @@ pub(super) struct Found {
 pub(super) type Carried = [u32; PATCH_POINTS];
 
 impl Found {
-    pub(super) fn new(are_meshes: bool) -> Self {
+    pub(super) fn new() -> Self {
         Self {
-            are_meshes,
             contacts: [Contact::default(); ROOM],
             count: 0,
             begins: [0; MAX_PATCHES + 1],
@@ -96,9 +94,7 @@ impl Found {
             let deeper_m = one.gap_m - contact.gap_m;
             let is_aside = one.normal_M.dot(&contact.normal_M) < AGREES;
             let stays = contact.carried && !one.carried && is_aside && deeper_m > -together_m;
-            // Of two meshes a corner that is beside a face by next to nothing takes no place from one that is on it.
-            let is_beside = self.are_meshes && is_aside && one.gap_m >= 0.0 && contact.gap_m < 0.0;
-            if there >= begin && (deeper_m > together_m || stays || is_beside) {
+            if there >= begin && (deeper_m > together_m || stays) {
                 self.contacts[there] = contact;
             }
         } else if let Some(place) = self.contacts.get_mut(self.count) {

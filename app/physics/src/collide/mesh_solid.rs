@@ -71,7 +71,7 @@ pub(super) fn contact_points(
 /// All contacts, of each place by its plane.
 fn find(mesh: &Mesh, other: &Other<'_>, [reach_m, travel_m]: [f64; 2], patches: &mut Patches) -> Found {
     look_around(mesh, other, reach_m, travel_m, patches);
-    let mut found = Found::new(matches!(other.solid, Solidity::Mesh(_)));
+    let mut found = Found::new();
     for number in 0..MAX_PATCHES {
         found.begin(number, &patches.all[number].carried);
         if patches.all[number].is_known {
@@ -364,10 +364,14 @@ impl Place<'_> {
         });
     }
 
-    /// What is another place's, that one finds.
+    /// What is another place's, that one finds. A corner that is beside a single place by next to nothing would take the room of
+    /// one that is on it.
     fn push(&mut self, contact: Contact) {
         let is_near = contact.gap_m <= self.meeting.reach_m;
-        if !is_near || self.patches.belongs_elsewhere(self.number, &contact.normal_M) {
+        let is_single = self.meeting.depth_m > 0.0 && !self.patches.are_several();
+        let is_beside =
+            is_single && contact.gap_m >= 0.0 && contact.normal_M.dot(&self.meeting.normal_M) < BESIDE;
+        if !is_near || is_beside || self.patches.belongs_elsewhere(self.number, &contact.normal_M) {
             return;
         }
         self.found.push(contact);
@@ -378,6 +382,8 @@ impl Place<'_> {
 const COARSE: usize = 16;
 /// From a place among several \[m\].
 const BEHIND_M: f64 = 1e-3;
+/// Cosine between a normal and that of a place that it is beside.
+const BESIDE: f64 = 0.3;
 /// Turns between the two until the nearest points are about found.
 const TO_AND_FRO: usize = 4;
 /// Points at most so many times as deep as the deepest of the last tick are found.
