@@ -1,30 +1,33 @@
 //! Contacts between entities: what begins in something else, and what sinks into it.
 //!
 //! Model: a thing is pressed into what it touches below it by its own weight and by what stands on it, in equal shares; what touches
-//! nothing will come down on what is near. The stiffness is that of a run ([`Contacts`]), on one point.
+//! nothing will come down on what is the first below it. The stiffness is that of a run ([`Contacts`]), on one point.
 
 #![allow(non_snake_case)] // Frames are capital letters.
 
-use crate::rig::Rig;
+use crate::rig::{Rig, in_words};
 use haptics::mesh::Sides;
-use haptics::{Entity, Shape};
-use nalgebra::Vector3;
+use haptics::{Entity, Form, Plane, Shape};
+use nalgebra::{Isometry3, Vector3};
 use physics::collide::{ContactPoints, PairMemory, Solid, bounding_ball, contact_points, is_collidable};
 use physics::{Aabb, Contacts};
 
 /// Warnings of them.
-pub(super) fn all(rig: &Rig, entities: &[Entity]) -> Vec<String> {
+pub(super) fn all(rig: &Rig, entities: &[Entity], pairs: &[Pair]) -> Vec<String> {
     let mut weights_n = vec![0.0; entities.len()];
     let gravity_m_s2 = rig.scene.gravity_m_s2.norm();
     rig.masses(entities).for_each(|(index, mass_kg)| weights_n[index] = mass_kg * gravity_m_s2);
-    let mut pairs = Vec::new();
-    near_pairs(rig, entities, |a, b| {
-        let (gap_m, normal_W) = nearest(&entities[a], &entities[b]);
-        pairs.push(Pair { one: a, other: b, gap_m, normal_W });
-    });
-    let looks = Looks { rig, entities, contacts: rig.contacts(entities), weights_n };
+    let heaviest_kg = rig.masses(entities).map(|(_, mass_kg)| mass_kg).fold(0.0, f64::max);
+    let looks = Looks { rig, entities, contacts: rig.contacts(entities), weights_n, heaviest_kg };
     let mut found = told(pairs.iter().filter_map(|pair| looks.overlap(pair)), "begin in each other");
-    let stands = looks.stands(&pairs);
+    let (stands, falls) = looks.stands(pairs);
+    if !falls.is_empty() {
+        let names: Vec<String> = falls.iter().map(|&index| rig.scene.entities[index].name.clone()).collect();
+        found.push(format!(
+            "nothing is below {}: it falls, unless a finger or a field holds it",
+            in_words(&names)
+        ));
+    }
     found.extend(told(stands.iter().filter_map(|stand| looks.sinks(stand)), "sink into each other"));
     found
 }
@@ -40,14 +43,30 @@ fn told(lines: impl Iterator<Item = String>, what: &str) -> Vec<String> {
     told
 }
 
+/// All that are near each other.
+pub(super) fn pairs(rig: &Rig, entities: &[Entity]) -> Vec<Pair> {
+    let mut pairs = Vec::new();
+    near_pairs(rig, entities, |a, b| {
+        let (gap_m, normal_W) = nearest(&entities[a], &entities[b]);
+        pairs.push(Pair { one: a, other: b, gap_m, normal_W });
+    });
+    pairs
+}
+
 /// Two that are near each other; the first one moves.
-struct Pair {
-    one: usize,
-    other: usize,
+pub(super) struct Pair {
+    pub(super) one: usize,
+    pub(super) other: usize,
     /// Negative where they overlap; infinite where they are farther apart than [`TOUCH_M`].
     gap_m: f64,
     /// There, to the first one.
     normal_W: Vector3<f64>,
+}
+
+impl Pair {
+    pub(super) fn touches(&self) -> bool {
+        self.gap_m <= TOUCH_M
+    }
 }
 
 /// What stands or will fall on something else.
@@ -63,6 +82,7 @@ struct Looks<'a> {
     entities: &'a [Entity],
     contacts: Contacts,
     weights_n: Vec<f64>,
+    heaviest_kg: f64,
 }
 
 impl Looks<'_> {
@@ -75,42 +95,65 @@ impl Looks<'_> {
             .then(|| format!("{name} begins {:.2} mm deep in {other}, and will be pushed out", depth_m * 1e3))
     }
 
-    /// Who stands on whom, from above to below, each with what presses there.
-    fn stands(&self, pairs: &[Pair]) -> Vec<Stand> {
+    /// Who stands on whom, from above to below, each with what presses there; and what falls for ever.
+    fn stands(&self, pairs: &[Pair]) -> (Vec<Stand>, Vec<usize>) {
         let up_W = -self.rig.scene.gravity_m_s2.try_normalize(0.0).unwrap_or_default();
         let height = |index: usize| {
             let around = Aabb::of_entity(&self.entities[index]);
             around.map_or(f64::NEG_INFINITY, |around| around.middle_W().dot(&up_W))
         };
         let is_body = |index: usize| self.weights_n[index] > 0.0;
-        let mut touches = vec![false; self.entities.len()];
-        for pair in pairs.iter().filter(|pair| pair.gap_m <= TOUCH_M) {
-            [pair.one, pair.other].into_iter().for_each(|index| touches[index] = true);
-        }
-        let mut below = vec![Vec::new(); self.entities.len()];
-        for &Pair { one, other, gap_m, ref normal_W } in pairs {
-            let is_above = if gap_m <= TOUCH_M { normal_W.dot(&up_W) } else { height(one) - height(other) };
-            let (upper, lower) = if is_above >= 0.0 { (one, other) } else { (other, one) };
-            let stands = gap_m <= TOUCH_M && is_above.abs() > BESIDE;
-            if is_body(upper) && (stands || !touches[upper]) {
-                below[upper].push(lower);
+        let mut below: Vec<Vec<(f64, usize)>> = vec![Vec::new(); self.entities.len()];
+        for pair in pairs.iter().filter(|pair| pair.touches()) {
+            let is_above = pair.normal_W.dot(&up_W);
+            let (upper, lower) =
+                if is_above >= 0.0 { (pair.one, pair.other) } else { (pair.other, pair.one) };
+            if is_body(upper) && is_above.abs() > BESIDE {
+                below[upper].push((pair.gap_m, lower));
             }
         }
         let mut order: Vec<usize> = (0..self.entities.len()).filter(|&index| is_body(index)).collect();
         order.sort_by(|&a, &b| height(b).total_cmp(&height(a)));
-        let (mut loads_n, mut stands) = (self.weights_n.clone(), Vec::new());
+        let (mut loads_n, mut stands, mut falls) = (self.weights_n.clone(), Vec::new(), Vec::new());
         for upper in order {
-            // What is in the air comes down on one of them.
-            let share = if touches[upper] { below[upper].len() as f64 } else { 1.0 };
-            let load_n = loads_n[upper] / share;
-            for &lower in &below[upper] {
-                if is_body(lower) && touches[upper] {
-                    loads_n[lower] += load_n;
+            // Of what is not quite touched, what is reached first carries it.
+            let least_m = below[upper].iter().map(|(gap_m, _)| *gap_m).fold(f64::INFINITY, f64::min);
+            let mut carries: Vec<usize> = below[upper]
+                .iter()
+                .filter(|(gap_m, _)| *gap_m < least_m + AT_ONCE_M)
+                .map(|one| one.1)
+                .collect();
+            if carries.is_empty() {
+                match self.first_below(upper, &up_W) {
+                    Some(lower) => carries.push(lower),
+                    None => falls.push(upper),
                 }
+            }
+            let load_n = loads_n[upper] / carries.len() as f64;
+            for lower in carries {
+                loads_n[lower] += load_n;
                 stands.push(Stand { upper, lower, load_n });
             }
         }
-        stands
+        (stands, falls)
+    }
+
+    /// What it would come down on from where it is.
+    fn first_below(&self, upper: usize, up_W: &Vector3<f64>) -> Option<usize> {
+        let (entity, around) = (&self.entities[upper], Aabb::of_entity(&self.entities[upper])?);
+        let falls_m = |other: usize| {
+            let b = &self.entities[other];
+            let meets = other != upper && b.is_collidable && b.space == entity.space;
+            if !meets || !(is_collidable(&entity.shape, &b.shape) || is_collidable(&b.shape, &entity.shape)) {
+                return None;
+            }
+            match &b.shape {
+                Shape::Form(Form::Plane(plane)) => falls_on_plane(&around, b, plane, up_W),
+                _ => falls_on_box(&around, &Aabb::of_entity(b)?, up_W),
+            }
+        };
+        let all = (0..self.entities.len()).filter_map(|other| Some((falls_m(other)?, other)));
+        all.min_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, other)| other)
     }
 
     /// On one point it is brought deeper than a quarter of how thick the thinner one is: a little more, and it falls through.
@@ -122,7 +165,8 @@ impl Looks<'_> {
             [a, b].into_iter().filter_map(|index| self.thickness_m(index)).fold(f64::INFINITY, f64::min);
         let [name, other] = self.names([a, b]);
         let sinks_m = Some(sinks_m).filter(|sinks_m| *sinks_m > SHARE_OF_THICKNESS * thickness_m)?;
-        let is_by_mass = sinks_m < DEPTH_BY_MASS_M;
+        // As stiff as by mass, or stiffer, it sinks in for being thin.
+        let is_by_mass = stiffness_n_per_m >= 0.999 * BY_MASS_N_PER_M_KG * self.heaviest_kg;
         Some(if is_by_mass {
             format!(
                 "{name} and {other}: the thinner one is {:.3} mm thick, and contacts are {:.3} mm deep at rest; make it thicker",
@@ -144,19 +188,51 @@ impl Looks<'_> {
         self.contacts.between(&self.entities[a], &self.entities[b]).0
     }
 
-    /// Least side of the box around it; `None`: it has no end, or is a sheet, through which nothing sinks.
+    /// Least side of its own box; `None`: it has no end, or is a sheet, through which nothing sinks.
     fn thickness_m(&self, index: usize) -> Option<f64> {
         let is_sheet =
             matches!(&self.entities[index].shape, Shape::Mesh(mesh) if mesh.sides() == Sides::Sheet);
         if is_sheet {
             return None;
         }
-        Aabb::of_entity(&self.entities[index]).map(|around| (around.high_W - around.low_W).min())
+        let around = Aabb::of_shape(&self.entities[index].shape, &Isometry3::identity())?;
+        Some((around.high_W - around.low_W).min())
     }
 
     fn names(&self, indices: [usize; 2]) -> [&str; 2] {
         indices.map(|index| self.rig.scene.entities[index].name.as_str())
     }
+}
+
+/// How far a box falls until it is on a half-space (m); `None`: never.
+fn falls_on_plane(around: &Aabb, entity: &Entity, plane: &Plane, up_W: &Vector3<f64>) -> Option<f64> {
+    let normal_W = entity.X_WB.rotation * plane.normal_B();
+    let half_m = (around.high_W - around.low_W).abs() * 0.5;
+    let from_W = around.middle_W() - entity.X_WB.translation.vector;
+    let above_m = normal_W.dot(&from_W) - plane.offset_m() - normal_W.abs().dot(&half_m);
+    let down = normal_W.dot(up_W);
+    (down > BESIDE).then_some((above_m / down).max(0.0))
+}
+
+/// How far a box falls until it is on another one (m); `None`: never.
+fn falls_on_box(around: &Aabb, other: &Aabb, up_W: &Vector3<f64>) -> Option<f64> {
+    let (mut first_m, mut last_m) = (0.0_f64, f64::INFINITY);
+    for axis in 0..3 {
+        let [near_m, far_m] =
+            [other.low_W[axis] - around.high_W[axis], other.high_W[axis] - around.low_W[axis]];
+        let down = -up_W[axis];
+        if down.abs() < 1e-9 {
+            if near_m > 0.0 || far_m < 0.0 {
+                return None;
+            }
+            continue;
+        }
+        let ends_m = [near_m / down, far_m / down];
+        first_m = first_m.max(ends_m[0].min(ends_m[1]));
+        last_m = last_m.min(ends_m[0].max(ends_m[1]));
+    }
+    // What it is in already it does not fall on.
+    (first_m <= last_m && last_m > 0.0).then_some(first_m)
 }
 
 /// Each pair of which one moves, whose bounding balls meet, once; the one that moves first.
@@ -209,11 +285,13 @@ fn nearest(a: &Entity, b: &Entity) -> (f64, Vector3<f64>) {
 
 /// What is nearer stands on each other \[m\].
 const TOUCH_M: f64 = 1e-3;
+/// What is farther by less is reached at once \[m\].
+const AT_ONCE_M: f64 = 1e-5;
 /// Cosine between a normal and what is up where nothing is carried.
 const BESIDE: f64 = 0.2;
 /// A tenth of a millimetre is what rounding in a file leaves.
 const LEAST_DEPTH_M: f64 = 1e-4;
 const SHARE_OF_THICKNESS: f64 = 0.25;
-/// By mass nothing rests deeper: `g / (1000 / s)^2`, and roundings.
-const DEPTH_BY_MASS_M: f64 = 1e-5;
+/// Stiffness of a contact by mass, of each kilogramme \[N/(m kg)\].
+const BY_MASS_N_PER_M_KG: f64 = 1e6;
 const MOST_TOLD: usize = 10;

@@ -1,53 +1,71 @@
 //! What integrators throw away that take forces from the beginning of a tick.
 //!
-//! Model: a body on the springs and dampers of a contact, four points for a face, one for what is round, or of a finger. A tick
+//! Model: a body on the springs and dampers of all contacts that it begins with, or of any other, four points for a face, one for what
+//! is round, or of a finger; as it hops, rocks or rolls. A tick
 //! of such an integrator multiplies what moves there by a matrix of two rows; where one of its eigenvalues is larger than 1 in
 //! size, every swing is larger than the last one. With `c = k dt^2 / m` and `d = b dt / m`, Euler's method with the new
 //! velocity stands `c + 2 d < 4`; the finger's spring is described from where the body would be at the tick's end, which makes d
 //! larger by c. The eigenvalues z of the equation give `1 + z + z^2/2 + z^3/6 + z^4/24` to Runge and Kutta.
 
+use super::contacts::Pair;
 use crate::rig::{Rig, in_words};
 use haptics::{Entity, Form, Shape};
-use nalgebra::Complex;
-use physics::{ContactDamping, Integrator};
+use nalgebra::{Complex, Isometry3};
+use physics::{Aabb, Body, ContactDamping, Integrator};
+use std::collections::BTreeMap;
 
 /// The warning of them, if there are any.
-pub(super) fn all(rig: &Rig, entities: &[Entity]) -> Option<String> {
+pub(super) fn all(rig: &Rig, entities: &[Entity], pairs: &[Pair]) -> Option<String> {
     let integrator = rig.integrator();
+    if integrator == Integrator::Implicit {
+        return None;
+    }
     let dt_s = rig.period_ns as f64 / 1e9;
-    let masses: Vec<_> = rig.masses(entities).collect();
+    let gives: BTreeMap<usize, f64> = rig
+        .bodies(entities)
+        .filter_map(|body| body.ok().map(|(index, body)| (index, gives_per_kg(&entities[index], &body))))
+        .collect();
     let contacts = rig.contacts(entities);
-    let inverse_kg =
-        |index: usize| masses.iter().find(|(of, _)| *of == index).map_or(0.0, |(_, mass_kg)| mass_kg.recip());
-    let on_fingers = |entity: &Entity, mass_kg: f64| {
-        let [c, d] =
-            [entity.stiffness_n_per_m * dt_s * dt_s / mass_kg, entity.damping_n_s_per_m * dt_s / mass_kg];
+    let gives_per_kg = |index: usize| gives.get(&index).copied().unwrap_or(0.0);
+    let on_fingers = |index: usize| {
+        let (entity, gives_per_kg) = (&entities[index], gives_per_kg(index) / points(&entities[index]));
+        let c = entity.stiffness_n_per_m * dt_s * dt_s * gives_per_kg;
+        let d = entity.damping_n_s_per_m * dt_s * gives_per_kg;
         entity.is_haptic
             && growth(integrator, c, if integrator == Integrator::Rk4 { d } else { c + d }) > GROWS
     };
+    // Of a spring matrix the largest eigenvalue is no larger than the largest sum of a row.
+    let shares = |index: usize, other: usize| {
+        let points = points(&entities[index]).min(points(&entities[other])) / points(&entities[index]);
+        let [one, both] = [gives_per_kg(index), (gives_per_kg(index) * gives_per_kg(other)).sqrt()]
+            .map(|per_kg| per_kg * points);
+        let (k, damping) = contacts.between(&entities[index], &entities[other]);
+        let b = match damping {
+            ContactDamping::Constant(b) => b,
+            ContactDamping::Ratio(ratio) => 2.0 * ratio * (k / gives_per_kg(index)).sqrt(),
+        };
+        [k * dt_s, b].map(|by_velocity| by_velocity * dt_s * (one + both))
+    };
+    let grows = |[c, d]: [f64; 2]| growth(integrator, c, d) > GROWS;
     let on_others = |index: usize| {
         let entity = &entities[index];
-        let others = entities.iter().enumerate().filter(|(other, _)| *other != index);
-        let others = others.filter(|(_, other)| other.is_collidable && other.space == entity.space);
-        others
-            .map(|(other, b)| (points(entity).min(points(b)), b, inverse_kg(index) + inverse_kg(other)))
-            .any(|(points, other, gives_per_kg)| {
-                let (k, damping) = contacts.between(entity, other);
-                let b = match damping {
-                    ContactDamping::Constant(b) => b,
-                    ContactDamping::Ratio(ratio) => 2.0 * ratio * (k / gives_per_kg).sqrt(),
-                };
-                let gives = points * gives_per_kg * dt_s;
-                growth(integrator, k * dt_s * gives, b * gives) > GROWS
-            })
+        let others = (0..entities.len()).filter(|&other| other != index);
+        let mut others =
+            others.filter(|&other| entities[other].is_collidable && entities[other].space == entity.space);
+        let touched = pairs.iter().filter(|pair| pair.touches());
+        let touched = touched.filter_map(|pair| match index {
+            _ if index == pair.one => Some(pair.other),
+            _ if index == pair.other => Some(pair.one),
+            _ => None,
+        });
+        let of_all =
+            touched.map(|other| shares(index, other)).fold([0.0; 2], |[c, d], one| [c + one[0], d + one[1]]);
+        grows(of_all) || others.any(|other| grows(shares(index, other)))
     };
-    let is_thrown = |&&(index, mass_kg): &&(usize, f64)| {
-        let entity = &entities[index];
-        on_fingers(entity, mass_kg) || entity.is_collidable && on_others(index)
-    };
-    let thrown = masses.iter().filter(is_thrown).map(|(index, _)| rig.scene.entities[*index].name.clone());
-    let names: Vec<String> = thrown.collect();
-    (integrator != Integrator::Implicit && !names.is_empty()).then(|| {
+    let is_thrown = |index: &usize| on_fingers(*index) || entities[*index].is_collidable && on_others(*index);
+    let thrown = gives.keys().filter(|index| is_thrown(index));
+    let names: Vec<String> = thrown.map(|&index| rig.scene.entities[index].name.clone()).collect();
+    (!names.is_empty()).then(|| {
         format!(
             "`integrator = \"{}\"` throws away {}: too light for springs and dampers as stiff at {} Hz; leave out \
              `integrator`, which is to compare with only",
@@ -56,6 +74,23 @@ pub(super) fn all(rig: &Rig, entities: &[Entity]) -> Option<String> {
             dt_s.recip()
         )
     })
+}
+
+/// The most that a body gives way to springs of one stiffness at all its points on something flat, by their stiffness (1/kg): as it
+/// hops, as it rocks about an axis of its own, or as a round one rolls.
+fn gives_per_kg(entity: &Entity, body: &Body) -> f64 {
+    let hops = points(entity) / body.mass.mass_kg;
+    let Some(around) =
+        Aabb::of_shape(&entity.shape, &Isometry3::identity()).filter(|_| !body.rotation_locked)
+    else {
+        return hops;
+    };
+    let half_m = (around.high_W - around.low_W) * 0.5;
+    let inertia_B = body.mass.inertia_B().diagonal();
+    let rocks = (0..3).flat_map(|axis| [(axis + 1) % 3, (axis + 2) % 3].map(|arm| (axis, arm)));
+    let rocks = rocks.map(|(axis, arm)| points(entity) * half_m[arm] * half_m[arm] / inertia_B[axis]);
+    let is_round = points(entity) == 1.0;
+    if is_round { hops + rocks.fold(0.0, f64::max) } else { rocks.fold(hops, f64::max) }
 }
 
 /// Contact points on something flat.

@@ -16,6 +16,7 @@ pub(super) fn all(rig: &Rig, measures: &[Measures]) -> Vec<String> {
     let mut found: Vec<String> = measures.iter().filter_map(|it| length(rig, it)).collect();
     found.extend(measures.iter().filter_map(nothing));
     found.extend(measures.iter().filter_map(mass));
+    found.extend(measures.iter().flat_map(|it| turning(rig, it)));
     found.extend(densities(&rig.scene));
     found.extend(far(rig, measures));
     found.extend(fingers(&rig.scene));
@@ -117,6 +118,26 @@ fn mass(it: &Measures) -> Option<String> {
     } else {
         None
     }
+}
+
+/// Resistance to rolling and spinning as a number, as it stands in tables: it is a length.
+fn turning(rig: &Rig, it: &Measures) -> Vec<String> {
+    let Some((entity, length_m)) = spec_of(rig, &it.name).zip(it.length_m()) else { return Vec::new() };
+    let lengths = [
+        ("rolling_friction_m", entity.rolling_friction_m),
+        ("torsional_friction_m", entity.torsional_friction_m),
+    ];
+    let beyond = lengths.into_iter().filter(|(_, value_m)| *value_m > 0.5 * length_m);
+    let told = beyond.map(|(key, value_m)| {
+        format!(
+            "{}: {key} is {} m, larger than it is itself, and it will hardly turn; it is a length, of tenths of \
+             millimetres: of a coefficient of rolling, that times the radius, {}",
+            it.name,
+            short(value_m),
+            short(value_m * 0.5 * length_m)
+        )
+    });
+    told.collect()
 }
 
 /// Densities in grams per cubic centimetre.

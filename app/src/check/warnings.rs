@@ -19,8 +19,9 @@ pub(super) fn all(rig: &Rig, whole: &Scene, entities: &[Entity]) -> Vec<String> 
     let mut warnings = too_stiff(rig, &mut stands);
     warnings.extend(too_damped(rig));
     warnings.extend(together::too_much(rig, entities, &mut stands));
-    warnings.extend(contacts::all(rig, entities));
-    warnings.extend(explicit::all(rig, entities));
+    let pairs = contacts::pairs(rig, entities);
+    warnings.extend(contacts::all(rig, entities, &pairs));
+    warnings.extend(explicit::all(rig, entities, &pairs));
     warnings.extend(inside(rig, entities));
     warnings.extend(closed(rig, entities));
     warnings.extend(idle_faces(rig));

@@ -23,7 +23,7 @@ impl Rig {
     }
 
     /// The bodies of these entities, with their numbers.
-    pub(super) fn bodies(
+    pub(crate) fn bodies(
         &self,
         entities: &[Entity],
     ) -> impl Iterator<Item = Result<(usize, Body), RigError>> {

@@ -493,16 +493,79 @@ fn check_tells_by_what_stands_on_it_how_deep_each_of_a_stack_sinks_into_the_one_
     assert_eq!(said.matches(" sinks ").count(), 3, "{said}");
 }
 
+/// In the air, high above all of it; leaning, thicker in the world than it is; with nothing below; and rolling "coefficients".
+#[test]
+fn check_tells_what_falls_on_what_and_how_thin_it_is_whichever_way_it_is_turned() {
+    let told = |things: &str| {
+        let place = Workplace::new();
+        place.write("scene.toml", &format!("[[finger]]\nstart_m = [0, 3, 0]\n{things}"));
+        place.run(["check", "scene.toml"]).out
+    };
+    let cube = |name: &str, at: [f64; 3], size: [f64; 3], more: &str| {
+        format!(
+            "[[entity]]\nname = \"{name}\"\nposition_m = {at:?}\nstiffness_n_per_m = 1000\n\
+             shape = {{ kind = \"box\", size_m = {size:?} }}\n{more}\n"
+        )
+    };
+    let table = cube("table", [0.0, -0.01, 0.0], [0.5, 0.02, 0.5], "");
+    let said = told(
+        &(table.clone()
+            + &cube("c0", [0.0, 0.011, 0.0], [0.04, 0.02, 0.04], "mass_kg = 1")
+            + &cube("c1", [0.0, 0.6, 0.0], [0.04, 0.02, 0.04], "mass_kg = 1")),
+    );
+    for line in ["c0 sinks 39.24 mm into table", "c1 sinks 19.62 mm into c0"] {
+        assert!(said.contains(line) && said.matches(" sinks ").count() == 2, "{said}");
+    }
+    let leans = "mass_kg = 1\norientation_wxyz = [0.991444861, 0, 0, 0.130526192]";
+    let said = told(&(table.clone() + &cube("plank", [0.0, 0.05, 0.0], [0.2, 0.02, 0.1], leans)));
+    assert!(said.contains("plank sinks 19.62 mm into table"), "{said}");
+    let said = told(&(table.clone() + &cube("lost", [2.0, 0.1, 0.0], [0.04; 3], "mass_kg = 0.1")));
+    assert!(said.contains("nothing is below lost"), "{said}");
+    let rolls = "mass_kg = 0.1\nrolling_friction_m = 0.5";
+    let said = told(&(table + &cube("roller", [0.0, 0.02, 0.0], [0.04; 3], rolls)));
+    assert!(
+        said.contains("rolling_friction_m is 0.5 m, larger than it is") && said.contains("0.01"),
+        "{said}"
+    );
+}
+
+/// A tower of a hundred is deep by mass: another kind is no advice.
+#[test]
+fn check_does_not_advise_what_is_so_already() {
+    let cube = |at: usize| {
+        format!(
+            "[[entity]]\nname = \"b{at}\"\nposition_m = [0, {}, 0]\nmass_kg = 0.1\n\
+             shape = {{ kind = \"box\", size_m = [0.004, 0.004, 0.004] }}\n",
+            0.002 + 0.004 * at as f64
+        )
+    };
+    let floor =
+        "[[entity]]\nname = \"floor\"\nshape = { kind = \"plane\", normal = [0, 1, 0], offset_m = 0 }\n";
+    let place = Workplace::new();
+    let tower: String = (0..120).map(cube).collect();
+    place.write("scene.toml", &format!("[[finger]]\nstart_m = [0, 1, 0]\n{floor}{tower}"));
+    let said = place.run(["check", "scene.toml"]).out;
+    assert!(said.contains("make it thicker") && !said.contains("by-mass"), "{said}");
+}
+
 /// A gram on springs that a kilogram stands on: thrown away without the integrator that takes forces of the tick's end.
 #[test]
 fn check_tells_what_an_integrator_throws_away() {
-    let scene = |integrator: &str, mass_kg: f64| {
+    let scene = |integrator: &str, mass_kg: f64, height_m: f64, count: usize| {
+        let cubes: String = (0..count)
+            .map(|at| {
+                let (name, y) = (if at == 0 { "cube" } else { "next" }, 0.001 + height_m * (at as f64 + 0.5));
+                format!(
+                    "[[entity]]\nname = \"{name}{}\"\nposition_m = [0, {y}, 0]\nmass_kg = {mass_kg}\n\
+                     stiffness_n_per_m = 4000\nshape = {{ kind = \"box\", size_m = [0.04, {height_m}, 0.04] }}\n",
+                    if at == 0 { String::new() } else { at.to_string() }
+                )
+            })
+            .collect();
         format!(
             "integrator = \"{integrator}\"\n[[finger]]\nstart_m = [0, 1, 0]\n\
              [[entity]]\nname = \"floor\"\nstiffness_n_per_m = 4000\n\
-             shape = {{ kind = \"plane\", normal = [0, 1, 0], offset_m = 0 }}\n\
-             [[entity]]\nname = \"cube\"\nposition_m = [0, 0.021, 0]\nmass_kg = {mass_kg}\nstiffness_n_per_m = 4000\n\
-             shape = {{ kind = \"box\", size_m = [0.04, 0.04, 0.04] }}\n"
+             shape = {{ kind = \"plane\", normal = [0, 1, 0], offset_m = 0 }}\n{cubes}"
         )
     };
     for (integrator, mass_kg, is_thrown) in [
@@ -512,7 +575,7 @@ fn check_tells_what_an_integrator_throws_away() {
         ("rk4", 1.0, false),
         ("implicit", 0.0005, false),
     ] {
-        let scene = scene(integrator, mass_kg);
+        let scene = scene(integrator, mass_kg, 0.04, 1);
         let place = Workplace::new();
         place.write("scene.toml", &scene);
         let said = place.run(["check", "scene.toml"]).out;

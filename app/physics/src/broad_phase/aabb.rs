@@ -28,7 +28,8 @@ impl Aabb {
         Some(around.grown(stands_out_m)).filter(Self::is_finite)
     }
 
-    pub(crate) fn of_shape(shape: &Shape, X_WB: &Isometry3<f64>) -> Option<Self> {
+    /// Around a shape whose frame is there; `None` where it has no end, or nobody knows it.
+    pub fn of_shape(shape: &Shape, X_WB: &Isometry3<f64>) -> Option<Self> {
         let (centre_B, half_B) = match shape {
             Shape::Form(form) => (Vector3::zeros(), half_size(form)?),
             Shape::Mesh(mesh) => {

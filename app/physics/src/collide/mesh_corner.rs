@@ -1,6 +1,6 @@
 //! A vertex of a mesh, known as a corner of one of its faces: from there its neighbours are found.
 
-use haptics::mesh::{Mesh, Sides};
+use haptics::mesh::{Face, Mesh, Sides};
 use nalgebra::Vector3;
 
 /// Three times the face's number plus that of the corner.
@@ -55,11 +55,7 @@ impl Corner {
             if link.is_boundary() || link.is_turned() {
                 return true;
             }
-            let ends = [corner, (corner + 1) % 3].map(|end| mesh.vertices()[face.vertices[end] as usize]);
-            let edge = ends[1] - ends[0];
-            let bend = face.normal_B.cross(&mesh.faces()[link.face() as usize].normal_B).dot(&edge);
-            let bend = if mesh.sides() == Sides::Sheet { bend.abs() } else { bend };
-            if bend > FLAT * edge.norm() {
+            if bends(mesh, face, corner) {
                 return true;
             }
             is_closed = link.face() == fan.first;
@@ -76,15 +72,21 @@ impl Corner {
         })
     }
 
-    /// Visits the ends of all sharp edges that leave it, each with its face and number there. Edges that go straight on from
-    /// each other are one, however finely it is cut.
-    pub(super) fn for_each_sharp_edge(self, mesh: &Mesh, mut visit: impl FnMut(&Vector3<f64>, u32, usize)) {
+    /// Visits the ends of all edges that leave it and are sharp, or long and bent at all, each with its face and number there:
+    /// between round bars that cross there is no vertex. Edges that go straight on from each other are one, however
+    /// finely it is cut.
+    pub(super) fn for_each_edge(self, mesh: &Mesh, mut visit: impl FnMut(&Vector3<f64>, u32, usize)) {
         let from_M = self.point_M(mesh);
-        self.visit_sharp_edges(mesh, |mut to, face, edge| {
+        let [low_M, high_M] = mesh.bounds_B();
+        let long_m = LONG * (high_M - low_M).max();
+        self.visit_bent_edges(mesh, |mut to, face, edge, is_sharp| {
+            if !is_sharp && (to.point_M(mesh) - from_M).norm() * (MOST_PIECES as f64) < long_m {
+                return;
+            }
             let along_M = (to.point_M(mesh) - from_M).normalize();
             for _ in 0..MOST_PIECES {
                 let mut next = None;
-                to.visit_sharp_edges(mesh, |end, _, _| {
+                to.visit_bent_edges(mesh, |end, _, _, _| {
                     let way_M = end.point_M(mesh) - to.point_M(mesh);
                     if way_M.dot(&along_M) > STRAIGHT * way_M.norm() {
                         next = Some(end);
@@ -93,19 +95,27 @@ impl Corner {
                 let Some(end) = next else { break };
                 to = end;
             }
-            visit(to.point_M(mesh), face, edge);
+            if is_sharp || (to.point_M(mesh) - from_M).norm() > long_m {
+                visit(to.point_M(mesh), face, edge);
+            }
         });
     }
 
-    fn visit_sharp_edges(self, mesh: &Mesh, mut visit: impl FnMut(Self, u32, usize)) {
+    /// Says of each that sticks out whether it is sharp.
+    fn visit_bent_edges(self, mesh: &Mesh, mut visit: impl FnMut(Self, u32, usize, bool)) {
         let mut fan = Fan::new(mesh, self.0 / 3, (self.0 % 3) as usize);
         while let Some((number, corner)) = fan.next() {
             let face = &mesh.faces()[number as usize];
             let link = face.links[corner];
-            let is_sharp =
-                link.is_boundary() || mesh.faces()[link.face() as usize].normal_B.dot(&face.normal_B) < SHARP;
-            if is_sharp {
-                visit(Self(3 * number + (corner as u32 + 1) % 3), number, corner);
+            let end = Self(3 * number + (corner as u32 + 1) % 3);
+            if link.is_boundary() {
+                visit(end, number, corner, true);
+                continue;
+            }
+            let beyond = &mesh.faces()[link.face() as usize].normal_B;
+            let is_sharp = beyond.dot(&face.normal_B) < SHARP;
+            if is_sharp || bends(mesh, face, corner) {
+                visit(end, number, corner, is_sharp);
             }
         }
     }
@@ -159,6 +169,16 @@ impl<'m> Fan<'m> {
     }
 }
 
+/// Whether the edge that begins at a face's corner sticks out.
+fn bends(mesh: &Mesh, face: &Face, corner: usize) -> bool {
+    let ends = [corner, (corner + 1) % 3].map(|end| mesh.vertices()[face.vertices[end] as usize]);
+    let edge = ends[1] - ends[0];
+    let beyond = &mesh.faces()[face.links[corner].face() as usize].normal_B;
+    let bend = face.normal_B.cross(beyond).dot(&edge);
+    let bend = if mesh.sides() == Sides::Sheet { bend.abs() } else { bend };
+    bend > FLAT * edge.norm()
+}
+
 /// Normals that differ by less are the same: rounding of what lies in a plane.
 const FLAT: f64 = 1e-6;
 /// Cosine to the normal of a face that looks there.
@@ -167,6 +187,8 @@ const LOOKS: f64 = 0.2;
 const SHARP: f64 = 0.9;
 /// Cosine of a turn from one edge to the next that is none.
 const STRAIGHT: f64 = 1.0 - 1e-6;
+/// Of a mesh's longest side: a longer edge is long.
+const LONG: f64 = 0.25;
 /// Pieces that make one edge.
 const MOST_PIECES: usize = 32;
 /// Steps of a climb; the next tick goes on.

@@ -1,12 +1,14 @@
-//! Where an edge of one solid is cut off by the side of a mesh: the crossing of two edges.
+//! Where an edge of one solid is cut off by a mesh: the crossing of two edges.
 //!
 //! Problem: a cube that lies half over the end of a table has two corners on it, and two more points where its lower edges
 //! cross that of the table; without these it would fall off while its middle is still over the table.
 //! Model: the edge enters the mesh through its side; from there the way along the contact's normal leads out through the
-//! face that is pressed. Its normal is the contact's, the length of the way the depth.
+//! face that is pressed. Its normal is the contact's, the length of the way the depth. Or it dips through a ridge, in by one pressed
+//! face and out by another, as through the back of a round bar: then the way out is across both edges, from where it
+//! is as far behind the one face as behind the other.
 //! Cost: two queries for an edge that meets nothing, one to four more for each end where it does.
 
-use haptics::mesh::{Face, Mesh};
+use haptics::mesh::{Face, Hit, Mesh};
 use nalgebra::Vector3;
 
 /// An edge in the mesh's frame.
@@ -20,12 +22,16 @@ pub(super) struct WayOut<'w> {
     pub(super) along: Vector3<f64>,
     /// It is no longer \[m\].
     pub(super) most_m: f64,
+    /// The two touch already: before, corners press first.
+    pub(super) is_pressed: bool,
+    /// So much nearer the two may be that do not touch yet \[m\].
+    pub(super) ahead_m: f64,
     /// From a point to where nothing else is pressed \[m\].
     pub(super) lift: &'w dyn Fn(&Vector3<f64>) -> Vector3<f64>,
 }
 
 /// A place where it is cut off.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Cut {
     /// On the edge \[m\].
     pub(super) on_edge: Vector3<f64>,
@@ -33,25 +39,76 @@ pub(super) struct Cut {
     pub(super) on_mesh: Vector3<f64>,
     /// Out of the mesh.
     pub(super) out: Vector3<f64>,
-    /// Negative \[m\].
+    /// Negative where it is cut off already \[m\].
     pub(super) gap_m: f64,
 }
 
 impl Edge {
-    /// Seen from either end.
+    /// Seen from either end. Where it is not cut off yet, but will dip through a ridge when it has come nearer: there.
     pub(super) fn cuts(&self, mesh: &Mesh, way: &WayOut<'_>) -> [Option<Cut>; 2] {
         let [a, b] = self.ends;
-        [(a, b), (b, a)].map(|(from, to)| cut(mesh, &from, &to, way))
+        let ways = [(&a, &b), (&b, &a)];
+        let hits = ways.map(|(from, to)| mesh.first_hit(from, to));
+        if let [None, None] = hits {
+            return [self.will_dip(mesh, way), None];
+        }
+        if let Some(hits) = pressed_twice(mesh, &hits, way) {
+            return [self.dips(mesh, hits, way), None];
+        }
+        [0, 1].map(|at| cut(mesh, hits[at].as_ref().filter(|_| way.is_pressed)?, ways[at].1, way))
+    }
+
+    /// First between the sides where it would be if it were much nearer; from how far it is from there, between those that it
+    /// will meet.
+    fn will_dip(&self, mesh: &Mesh, way: &WayOut<'_>) -> Option<Cut> {
+        let far = self.dips_after(mesh, way, way.ahead_m).filter(|cut| cut.gap_m > 0.0)?;
+        self.dips_after(mesh, way, NEARER * far.gap_m).or(Some(far))
+    }
+
+    /// As if it were so much nearer (m).
+    fn dips_after(&self, mesh: &Mesh, way: &WayOut<'_>, by_m: f64) -> Option<Cut> {
+        let nearer_M = way.along * -by_m;
+        let [a, b] = self.ends.map(|end| end + nearer_M);
+        let hits = [mesh.first_hit(&a, &b)?, mesh.first_hit(&b, &a)?].map(Some);
+        let way = WayOut { most_m: way.most_m.max(2.0 * by_m), ..*way };
+        let cut = Self { ends: [a, b] }.dips(mesh, pressed_twice(mesh, &hits, &way)?, &way)?;
+        let gap_m = cut.gap_m + cut.out.dot(&way.along) * by_m;
+        Some(Cut { on_edge: cut.on_edge - nearer_M, gap_m, ..cut })
+    }
+
+    /// Where it dips deepest through a ridge.
+    fn dips(&self, mesh: &Mesh, hits: [&Hit; 2], way: &WayOut<'_>) -> Option<Cut> {
+        let faces = hits.map(|hit| &mesh.faces()[hit.face as usize]);
+        let [from, to] = hits.map(|hit| hit.point_B);
+        let along_edge = (to - from).try_normalize(0.0)?;
+        let ridge = faces[0].normal_B.cross(&faces[1].normal_B);
+        let out = along_edge.cross(&ridge).try_normalize(FLAT)?;
+        let out = if out.dot(&way.along) < 0.0 { -out } else { out };
+        if out.dot(&way.along) < AGREES {
+            return None;
+        }
+        // As deep behind the one as behind the other: both grow from their ends.
+        let falls = faces.map(|face| face.normal_B.dot(&along_edge).abs());
+        let on_edge = from + (to - from) * (falls[1] / (falls[0] + falls[1]));
+        let left = mesh.first_hit(&(on_edge + out * way.most_m), &on_edge)?;
+        let gap_m = -(left.point_B - on_edge).norm();
+        Some(Cut { on_edge, on_mesh: left.point_B, out, gap_m })
     }
 }
 
-fn cut(mesh: &Mesh, from: &Vector3<f64>, to: &Vector3<f64>, way: &WayOut<'_>) -> Option<Cut> {
-    let hit = mesh.first_hit(from, to)?;
+/// Where it goes in from either end, if that is through faces that are pressed.
+fn pressed_twice<'h>(mesh: &Mesh, hits: &'h [Option<Hit>; 2], way: &WayOut<'_>) -> Option<[&'h Hit; 2]> {
+    let [Some(first), Some(last)] = hits else { return None };
+    let is_pressed = |hit: &Hit| mesh.faces()[hit.face as usize].normal_B.dot(&way.along) > ASIDE;
+    (is_pressed(first) && is_pressed(last)).then_some([first, last])
+}
+
+fn cut(mesh: &Mesh, hit: &Hit, to: &Vector3<f64>, way: &WayOut<'_>) -> Option<Cut> {
     // Through the pressed face itself it goes without depth, through its back not at all.
     if mesh.faces()[hit.face as usize].normal_B.dot(&way.along).abs() > ASIDE {
         return None;
     }
-    let along_edge = (to - from).try_normalize(0.0)?;
+    let along_edge = (to - hit.point_B).try_normalize(0.0)?;
     let on_edge = hit.point_B + along_edge * (INSIDE * mesh.extent_m());
     // The way out may lean over the side that was entered: then it is looked for from farther inside.
     let farther = hit.point_B + along_edge * (0.5 * way.most_m).min(0.25 * (to - hit.point_B).norm());
@@ -71,6 +128,10 @@ fn pressed<'m>(mesh: &'m Mesh, point: &Vector3<f64>, way: &WayOut<'_>) -> Option
     (face.normal_B.dot(&way.along) > AGREES).then_some(face)
 }
 
+/// Of the way to where they touch: the one after which two edges touch surely, and next to no others.
+const NEARER: f64 = 1.05;
+/// Sine between two directions that are one.
+const FLAT: f64 = 1e-6;
 /// Cosine between the pressed face and a side.
 const ASIDE: f64 = 0.7;
 const AGREES: f64 = 0.7;

@@ -13,8 +13,8 @@
 //! Frames: the mesh's frame M; normals from the mesh to the other one.
 //! Of all that is found, what [carries](super::mesh_carry) counts.
 //! Limits: six places a pair. Crossings are found of a box's edges, of the lines along which cylinders, cones and capsules
-//! touch, and of sharp edges that leave the vertices of a mesh that were chosen, as far as these go straight on; where they bend,
-//! vertices lie as near. Rims of round forms are not cut off. An ellipsoid touches with one point: a flat one that tumbles comes down on its
+//! touch, and of sharp or long edges that leave the vertices of a mesh that were chosen, as far as these go straight on; where
+//! they bend, vertices lie as near. Rims of round forms are not cut off. An ellipsoid touches with one point: a flat one that tumbles comes down on its
 //! other end at once, deep, and is let out slowly. A sheet has no inside: what is far behind it is taken for what has always
 //! been there, and limbs that are thin beside the way of a tick are lost now and then (`tests/all/meshes_sheets.rs` counts them).
 //! Cost: for each place two choices of vertices and at most eight queries for the nearest point for each side; and a search
@@ -196,9 +196,7 @@ impl Place<'_> {
                 self.push(Contact::new(about, on_mesh_M, -seen.out, seen.gap_m));
             }
         }
-        if self.may_cut() {
-            chosen.into_iter().flatten().for_each(|corner| self.edges_of_mesh(corner));
-        }
+        chosen.into_iter().flatten().for_each(|corner| self.edges_of_mesh(corner));
     }
 
     /// Of one place among several, what lies behind it does not count; but what lies beside it does, where that is the end
@@ -267,8 +265,13 @@ impl Place<'_> {
     }
 
     /// Of a single place, corners press first.
-    fn may_cut(&self) -> bool {
+    fn is_pressed(&self) -> bool {
         self.meeting.depth_m > 0.0 || self.patches.are_several()
+    }
+
+    /// Single places' edges are stopped before they are in each other \[m\].
+    fn ahead_m(&self) -> f64 {
+        if self.patches.are_several() { 0.0 } else { self.meeting.reach_m }
     }
 
     /// The other one's points against the mesh.
@@ -300,11 +303,9 @@ impl Place<'_> {
             let about = About::Other(own.number);
             self.push(Contact::new(about, on_mesh_M, seen.out, seen.gap_m - own.radius_m));
         }
-        if self.may_cut() {
-            self.edges();
-            let corners = owns.into_iter().flatten().filter_map(|own| own.corner);
-            corners.for_each(|corner| self.edges_of_other(corner));
-        }
+        self.edges();
+        let corners = owns.into_iter().flatten().filter_map(|own| own.corner);
+        corners.for_each(|corner| self.edges_of_other(corner));
     }
 
     /// Where edges of a form are cut off by the mesh.
@@ -321,7 +322,7 @@ impl Place<'_> {
         let X_MO = self.other.X_MO;
         let place = |point: &Vector3<f64>| (X_MO * Point3::from(*point)).coords;
         let from = place(corner.point_M(second));
-        corner.for_each_sharp_edge(second, |to, face, edge| {
+        corner.for_each_edge(second, |to, face, edge| {
             let about = About::Cut { edge: 3 * face + edge as u32, of_mesh: false, end: 0 };
             self.cuts_by_mesh(&Edge { ends: [from, place(to)] }, about);
         });
@@ -329,7 +330,9 @@ impl Place<'_> {
 
     fn cuts_by_mesh(&mut self, edge: &Edge, about: About) {
         let lift = |point_M: &Vector3<f64>| self.lift_M(point_M, 1.0);
-        let way = WayOut { along: self.meeting.normal_M, most_m: self.way_m(), lift: &lift };
+        let ahead_m = self.ahead_m();
+        let (along, is_pressed) = (self.meeting.normal_M, self.is_pressed());
+        let way = WayOut { along, most_m: self.way_m(), is_pressed, ahead_m, lift: &lift };
         let cuts = edge.cuts(self.mesh, &way);
         for (end, cut) in cuts.into_iter().enumerate() {
             if let Some(cut) = cut {
@@ -350,9 +353,10 @@ impl Place<'_> {
             let point_M = (X_MO * Point3::from(*point)).coords;
             turned(&patches.lift_M(number, &point_M, -1.0, meeting.travel_m))
         };
-        let way = WayOut { along: turned(&-meeting.normal_M), most_m, lift: &lift };
+        let (along, is_pressed) = (turned(&-meeting.normal_M), self.is_pressed());
+        let way = WayOut { along, most_m, is_pressed, ahead_m: self.ahead_m(), lift: &lift };
         let from = place(corner.point_M(mesh));
-        corner.for_each_sharp_edge(mesh, |to, face, edge| {
+        corner.for_each_edge(mesh, |to, face, edge| {
             let cuts = Edge { ends: [from, place(to)] }.cuts(second, &way);
             for (end, cut) in cuts.into_iter().enumerate() {
                 let about = About::Cut { edge: 3 * face + edge as u32, of_mesh: true, end: end as u32 };

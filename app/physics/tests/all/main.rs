@@ -45,6 +45,7 @@ mod islands;
 mod ledger;
 mod let_out;
 mod limit_surface;
+mod meshes_bars;
 mod meshes_bumps;
 mod meshes_floor;
 mod meshes_mass;

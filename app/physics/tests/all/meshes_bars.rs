@@ -1,0 +1,136 @@
+//! Round bars of triangles that cross: between their ends they have no vertex.
+#![allow(non_snake_case)]
+
+use std::f64::consts::{FRAC_PI_2, PI, TAU};
+
+use crate::{common, meshes};
+
+use common::*;
+use haptics::{Capsule, Cuboid, Cylinder, Entity, Shape};
+use nalgebra::{Isometry3, UnitQuaternion, Vector3};
+use physics::{ContactStiffness, Settings};
+
+const RADIUS_M: f64 = 0.01;
+const LENGTH_M: f64 = 0.08;
+
+/// Along z, with so many sides, cut into pieces along it; a corner is on x where it is turned by nothing (rad).
+fn bar(sides: u32, pieces: usize, turn: f64) -> Shape {
+    let corner = |at: u32| {
+        let (sin, cos) = (TAU * f64::from(at) / f64::from(sides) + turn).sin_cos();
+        [RADIUS_M * cos, RADIUS_M * sin]
+    };
+    let outline: Vec<_> = (0..sides).map(corner).collect();
+    let fan: Vec<_> = (2..sides).map(|at| [0, at - 1, at]).collect();
+    let mut soup = meshes::prism(&outline, &fan, LENGTH_M);
+    // Of each side its two triangles become those of so many pieces, with rings of corners between them.
+    soup.faces.truncate(2 * fan.len());
+    let [low, high] = [soup.vertices[0].z, soup.vertices[sides as usize].z];
+    let mut rings: Vec<Vec<u32>> = vec![(0..sides).collect()];
+    for piece in 1..pieces {
+        let z = low + (high - low) * piece as f64 / pieces as f64;
+        let first = soup.vertices.len() as u32;
+        soup.vertices.extend(outline.iter().map(|[x, y]| Vector3::new(*x, *y, z)));
+        rings.push((first..first + sides).collect());
+    }
+    rings.push((sides..2 * sides).collect());
+    let faces_up = low > high;
+    for two in rings.windows(2) {
+        for at in 0..sides as usize {
+            let next = (at + 1) % sides as usize;
+            for [a, b, c] in
+                [[two[0][at], two[0][next], two[1][next]], [two[0][at], two[1][next], two[1][at]]]
+            {
+                soup.faces.push(if faces_up { [a, c, b] } else { [a, b, c] });
+            }
+        }
+    }
+    meshes::build(soup).into()
+}
+
+/// How high the middle of the one is above that of the other after 0.3 s (m); the lower one is fixed.
+fn rests_m(lower: &Shape, upper: &Shape, crossed: f64) -> f64 {
+    // Forms are along y.
+    let lying = |shape: &Shape| match shape {
+        Shape::Form(_) => UnitQuaternion::from_axis_angle(&Vector3::x_axis(), FRAC_PI_2),
+        _ => UnitQuaternion::identity(),
+    };
+    let above = Vector3::y() * (2.0 * RADIUS_M + 1e-4);
+    let crossed = UnitQuaternion::from_axis_angle(&Vector3::y_axis(), crossed);
+    let poses = [
+        Isometry3::from_parts(Vector3::zeros().into(), lying(lower)),
+        Isometry3::from_parts(above.into(), crossed * lying(upper)),
+    ];
+    let entities: Vec<Entity> = [lower, upper]
+        .into_iter()
+        .zip(poses)
+        .map(|(shape, at)| object(shape.clone(), at, 1000.0, 0.5))
+        .collect();
+    let bodies = [(1, body(&entities[1], 0.05))];
+    let contact_stiffness = ContactStiffness::ByMass { damping_ratio: 1.0 };
+    let mut world = World::new(entities, &bodies, Settings { contact_stiffness, ..Settings::default() }, 0);
+    for _ in 0..300 {
+        world.step(&[]);
+    }
+    world.entities[1].X_WB.translation.y
+}
+
+/// From the middle of a bar down to its side, or to its corner (m).
+fn reaches_m(sides: u32, is_corner: bool) -> f64 {
+    if is_corner { RADIUS_M } else { RADIUS_M * (PI / f64::from(sides)).cos() }
+}
+
+/// 9.8 um deep on one point; and as deep as a tick goes where only what is in each other is found, of the bluntest.
+fn assert_rests(at_m: f64, expected_m: f64, most_m: f64, told: &str) {
+    assert!((-most_m..1e-6).contains(&(at_m - expected_m)), "{told}: {:e} m", at_m - expected_m);
+}
+
+#[test]
+fn round_bars_that_cross_lie_on_each_other_however_many_sides_they_have() {
+    for (sides, most_m) in
+        [(4, 6e-5), (6, 6e-5), (8, 2e-5), (12, 2e-5), (16, 2e-5), (24, 2e-5), (48, 2e-5), (64, 2e-5)]
+    {
+        for (pieces, crossed) in
+            [1, 2, 7].into_iter().flat_map(|pieces| [FRAC_PI_2, 1.2, 0.7].map(|by| (pieces, by)))
+        {
+            for is_corner in [false, true] {
+                // On one corner few sides do not balance.
+                if is_corner && sides < 8 {
+                    continue;
+                }
+                let turn = FRAC_PI_2 + if is_corner { 0.0 } else { PI / f64::from(sides) };
+                let bar = bar(sides, pieces, turn);
+                let at_m = rests_m(&bar, &bar, crossed);
+                let told = format!("{sides} sides, {pieces} pieces, {is_corner}, {crossed}");
+                assert_rests(at_m, 2.0 * reaches_m(sides, is_corner), most_m, &told);
+            }
+        }
+    }
+}
+
+#[test]
+fn round_bars_of_triangles_and_closed_forms_lie_across_each_other() {
+    let forms: [Shape; 3] = [
+        Cylinder::new(RADIUS_M, LENGTH_M).unwrap().into(),
+        Capsule::new(RADIUS_M, LENGTH_M).unwrap().into(),
+        Cuboid::new([2.0 * RADIUS_M, LENGTH_M, 2.0 * RADIUS_M]).unwrap().into(),
+    ];
+    for (number, form) in forms.iter().enumerate() {
+        for (sides, crossed) in
+            [8, 16, 33, 64].into_iter().flat_map(|sides| [FRAC_PI_2, 0.9].map(|by| (sides, by)))
+        {
+            for is_corner in [false, true] {
+                let turn = FRAC_PI_2 + if is_corner { 0.0 } else { PI / f64::from(sides) };
+                // Of an odd number a side is opposite a corner.
+                let is_corner_below = if sides % 2 == 1 { !is_corner } else { is_corner };
+                let bar = bar(sides, 1, turn);
+                for (at_m, is_corner, what) in [
+                    (rests_m(&bar, form, crossed), is_corner, "above"),
+                    (rests_m(form, &bar, crossed), is_corner_below, "below"),
+                ] {
+                    let told = format!("{number} {what}, {sides} sides, {is_corner}, {crossed}");
+                    assert_rests(at_m, RADIUS_M + reaches_m(sides, is_corner), 3e-5, &told);
+                }
+            }
+        }
+    }
+}
