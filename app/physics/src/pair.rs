@@ -187,7 +187,7 @@ impl Pair {
         let has_springs = self.surfacing.response.has_springs();
         let mut springs = [Stretched::default(); MAX_SPRINGS];
         let (mut full, mut is_let_out) = (0.0, false);
-        let pushing_m = self.pushing_m(start);
+        let [pushing_m, squeezed_m] = [self.pushing_m(start), self.squeezed_m(start)];
         for (at, (anchor, point)) in self.anchors.iter_mut().zip(points).enumerate() {
             let depth_m = point.depth_m();
             let let_out_m = let_out_m_s(anchor.granted_m, start.dt_s) * start.dt_s;
@@ -198,6 +198,7 @@ impl Pair {
                 let pressed_m = worked_m.max((worked_m + let_out_m).min(pushing_m));
                 anchor.granted_m = anchor.granted_m.max(depth_m - pressed_m);
             }
+            anchor.granted_m = anchor.granted_m.max(depth_m - squeezed_m);
             is_let_out |= anchor.granted_m > 0.0;
             anchor.pressed_m = if point.gap_m < 0.0 { depth_m - anchor.granted_m } else { -point.gap_m };
             anchor.share = point.share;
@@ -237,10 +238,28 @@ impl Pair {
     /// Depth up to which springs are pressed that let something out \[m\]: it is no faster then when they throw it, and the
     /// heaviest rests less deep.
     fn pushing_m(&self, start: &Start<'_>) -> f64 {
+        self.throws_m(LET_OUT_M_S, start).max(self.surfacing.deepest_rest_m().min(REACH_M))
+    }
+
+    /// Depth up to which what is driven presses \[m\]: it would squeeze things by any force, and they would be shot out. It goes
+    /// through what does not give way.
+    fn squeezed_m(&self, start: &Start<'_>) -> f64 {
+        let is_driven = self
+            .bodies
+            .1
+            .is_some_and(|b| start.motions[b].inverse_mass == 0.0 && !start.motions[b].is_still());
+        if is_driven {
+            self.throws_m(SQUEEZED_M_S, start).max(self.surfacing.deepest_rest_m())
+        } else {
+            f64::INFINITY
+        }
+    }
+
+    /// Depth from which a spring throws what it presses at this speed \[m\].
+    fn throws_m(&self, speed_m_s: f64, start: &Start<'_>) -> f64 {
         let (a, b) = self.bodies;
         let per_kg = start.motions[a].inverse_mass + b.map_or(0.0, |b| start.motions[b].inverse_mass);
-        let thrown_m = LET_OUT_M_S / (self.surfacing.stiffness_n_per_m * per_kg).sqrt();
-        thrown_m.max(self.surfacing.deepest_rest_m().min(REACH_M))
+        speed_m_s / (self.surfacing.stiffness_n_per_m * per_kg).sqrt()
     }
 
     /// Somebody has put one of them where it is: what they held is gone, what they hold there is theirs.
@@ -426,6 +445,8 @@ pub(crate) fn is_near(a: &Entity, b: &Entity, reach_m: f64) -> bool {
         }
 }
 
+/// What is squeezed by something driven comes out no faster \[m/s\].
+const SQUEEZED_M_S: f64 = 1.0;
 /// Contact points are looked for from this distance on \[m\].
 pub(crate) const REACH_M: f64 = 1e-3;
 /// A contact point of another name within this distance is the same one \[m\].

@@ -1,11 +1,12 @@
 //! What integrators throw away that take forces from the beginning of a tick.
 //!
-//! Model: a body on the springs and dampers of all contacts that it begins with, or of any other, four points for a face, one for what
-//! is round, or of a finger; as it hops, rocks or rolls. A tick
-//! of such an integrator multiplies what moves there by a matrix of two rows; where one of its eigenvalues is larger than 1 in
-//! size, every swing is larger than the last one. With `c = k dt^2 / m` and `d = b dt / m`, Euler's method with the new
+//! Model: a body on the springs and dampers of all contacts that it begins with, or of any other, four points for a face, one for
+//! what is round, or of a finger; as it hops, rocks or rolls. A tick of such an integrator multiplies what moves there by a
+//! matrix of two rows; where one of its eigenvalues is larger than 1 in size, every swing is larger than the last one. With `c = k dt^2 / m` and `d = b dt / m`, Euler's method with the new
 //! velocity stands `c + 2 d < 4`; the finger's spring is described from where the body would be at the tick's end, which makes d
 //! larger by c. The eigenvalues z of the equation give `1 + z + z^2/2 + z^3/6 + z^4/24` to Runge and Kutta.
+
+#![allow(non_snake_case)] // Frames are capital letters.
 
 use super::contacts::Pair;
 use crate::rig::{Rig, in_words};

@@ -363,7 +363,7 @@ fn check_judges_effects_and_contacts_together() {
 /// A finger over a cube of this size, mass and place.
 fn with_cube(size: &str, mass: &str, place: &str) -> String {
     format!(
-        "[[finger]]\nstart_m = [0.0, 0.2, 0.0]\n[[entity]]\nname = \"cube\"\n\
+        "gravity_m_s2 = [0.0, 0.0, 0.0]\n[[finger]]\nstart_m = [0.0, 0.2, 0.0]\n[[entity]]\nname = \"cube\"\n\
          shape = {{ kind = \"box\", size_m = {size} }}\nmass_kg = {mass}\nposition_m = {place}\n"
     )
 }

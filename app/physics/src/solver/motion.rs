@@ -50,7 +50,7 @@ impl Motion {
 
     /// Whether it does not move, whatever could move it.
     #[inline]
-    pub(super) fn is_still(&self) -> bool {
+    pub(crate) fn is_still(&self) -> bool {
         [self.velocity_W, self.angular_velocity_W] == [Vector3::zeros(); 2]
     }
 

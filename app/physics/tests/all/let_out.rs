@@ -6,7 +6,7 @@ use crate::noise::Noise;
 use crate::thrown::{KINDS, shape};
 
 use common::*;
-use haptics::Entity;
+use haptics::{Cuboid, Entity};
 use nalgebra::{Isometry3, Vector3};
 use physics::{Body, ContactStiffness, Settings};
 
@@ -31,6 +31,36 @@ fn let_out(noise: &mut Noise, contact_stiffness: ContactStiffness, share: f64) -
         }
     }
     [fastest_m_s, pressed_s]
+}
+
+/// A plate is driven down through what lies on the floor, and stops a hand's breadth below it.
+#[test]
+fn what_is_driven_through_things_does_not_shoot_them_out() {
+    let contact_stiffness = ContactStiffness::ByMass { damping_ratio: 1.0 };
+    let settings = Settings { contact_stiffness, ..Settings::default() };
+    for (seed, kind) in KINDS.into_iter().enumerate() {
+        let plate = object(
+            Cuboid::new([0.3, 0.02, 0.3]).unwrap(),
+            Isometry3::translation(0.0, 0.1, 0.0),
+            1000.0,
+            0.5,
+        );
+        let noise = &mut Noise::new(seed as u64);
+        let thing = object(shape(kind, noise), Isometry3::translation(0.0, 0.03, 0.0), 1000.0, 0.5);
+        let entities = vec![floor(0.0, 1000.0, 0.5), plate, thing];
+        let bodies = [(2, body(&entities[2], 0.1))];
+        let mut world = World::new(entities, &bodies, settings, 0);
+        for tick in 0..1500 {
+            if (300..700).contains(&tick) {
+                let y = 0.1 - 0.14 * f64::from(tick - 299) / 400.0;
+                assert!(world.manipulation.drive(1, Isometry3::translation(0.0, y, 0.0)));
+            }
+            world.step(&[]);
+            let fastest_m_s = world.manipulation.bodies()[0].velocity_W.norm();
+            // Two springs at the most that they hold, one after the other, and what falls over.
+            assert!(fastest_m_s < 2.0, "{kind:?} at {tick}: {fastest_m_s} m/s");
+        }
+    }
 }
 
 #[test]
