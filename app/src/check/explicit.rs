@@ -110,7 +110,7 @@ fn growth(integrator: Integrator, c: f64, d: f64) -> f64 {
             .map(|z| (1.0 + z * (1.0 + z * (0.5 + z * (1.0 / 6.0 + z / 24.0)))).norm())
             .into_iter()
             .fold(0.0, f64::max),
-        _ => roots(2.0 - c - d, 1.0 - d).map(|z| z.norm()).into_iter().fold(0.0, f64::max),
+        _ => roots(2.0 - c - d, 1.0 - d).map(Complex::norm).into_iter().fold(0.0, f64::max),
     }
 }
 

@@ -6,7 +6,7 @@
 //! face that is pressed. Its normal is the contact's, the length of the way the depth. Or it dips through a ridge, in by one pressed
 //! face and out by another, as through the back of a round bar: then the way out is across both edges, from where it
 //! is as far behind the one face as behind the other.
-//! Cost: two queries for an edge that meets nothing, one to four more for each end where it does.
+//! Cost: four queries for an edge that meets nothing, one to four more for each end where it does.
 
 use haptics::mesh::{Face, Hit, Mesh};
 use nalgebra::Vector3;
@@ -31,7 +31,7 @@ pub(super) struct WayOut<'w> {
 }
 
 /// A place where it is cut off.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy)]
 pub(super) struct Cut {
     /// On the edge \[m\].
     pub(super) on_edge: Vector3<f64>,
@@ -58,22 +58,15 @@ impl Edge {
         [0, 1].map(|at| cut(mesh, hits[at].as_ref().filter(|_| way.is_pressed)?, ways[at].1, way))
     }
 
-    /// First between the sides where it would be if it were much nearer; from how far it is from there, between those that it
-    /// will meet.
+    /// As if it were so much nearer.
     fn will_dip(&self, mesh: &Mesh, way: &WayOut<'_>) -> Option<Cut> {
-        let far = self.dips_after(mesh, way, way.ahead_m).filter(|cut| cut.gap_m > 0.0)?;
-        self.dips_after(mesh, way, NEARER * far.gap_m).or(Some(far))
-    }
-
-    /// As if it were so much nearer (m).
-    fn dips_after(&self, mesh: &Mesh, way: &WayOut<'_>, by_m: f64) -> Option<Cut> {
-        let nearer_M = way.along * -by_m;
+        let nearer_M = way.along * -way.ahead_m;
         let [a, b] = self.ends.map(|end| end + nearer_M);
         let hits = [mesh.first_hit(&a, &b)?, mesh.first_hit(&b, &a)?].map(Some);
-        let way = WayOut { most_m: way.most_m.max(2.0 * by_m), ..*way };
+        let way = WayOut { most_m: way.most_m.max(2.0 * way.ahead_m), ..*way };
         let cut = Self { ends: [a, b] }.dips(mesh, pressed_twice(mesh, &hits, &way)?, &way)?;
-        let gap_m = cut.gap_m + cut.out.dot(&way.along) * by_m;
-        Some(Cut { on_edge: cut.on_edge - nearer_M, gap_m, ..cut })
+        let gap_m = cut.gap_m - cut.out.dot(&nearer_M);
+        (gap_m > 0.0).then_some(Cut { on_edge: cut.on_edge - nearer_M, gap_m, ..cut })
     }
 
     /// Where it dips deepest through a ridge.
@@ -128,8 +121,6 @@ fn pressed<'m>(mesh: &'m Mesh, point: &Vector3<f64>, way: &WayOut<'_>) -> Option
     (face.normal_B.dot(&way.along) > AGREES).then_some(face)
 }
 
-/// Of the way to where they touch: the one after which two edges touch surely, and next to no others.
-const NEARER: f64 = 1.05;
 /// Sine between two directions that are one.
 const FLAT: f64 = 1e-6;
 /// Cosine between the pressed face and a side.

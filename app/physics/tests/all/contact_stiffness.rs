@@ -215,6 +215,24 @@ fn a_tower_of_forty_stands_and_sinks_by_a_sum() {
     }
 }
 
+/// As a column under its own weight (Euler): `n^3 = 7.84 (1000 / s)^2 edge / g`, which is 25 cubes of 20 mm.
+#[test]
+fn a_tower_that_is_not_quite_straight_stands_up_to_where_its_springs_buckle() {
+    const EDGE_M: f64 = 0.02;
+    let leans_m = |count: u32| {
+        let aside = |place: u32| if place % 3 == 0 { 1e-4 } else { 0.0 };
+        let thing = |place: u32| {
+            let at = Isometry3::translation(aside(place), EDGE_M * (f64::from(place) + 0.5), 0.0);
+            (object(Cuboid::new([EDGE_M; 3]).unwrap(), at, 1000.0, 0.5), 0.1)
+        };
+        let mut table = Table::new((0..count).map(thing).collect(), settings(BY_MASS), 1000.0);
+        table.run(2.5);
+        table.body(count as usize - 1).centre_W.xz().norm()
+    };
+    let (below_m, beyond_m) = (leans_m(20), leans_m(32));
+    assert!(below_m < 1e-3 && beyond_m > 2e-2, "{below_m} {beyond_m}");
+}
+
 /// A ball that begins on the ground without having sunk in swings about its depth of rest as a damped spring does, whatever comes back
 /// of an impact: this is none.
 #[test]
