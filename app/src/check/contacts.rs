@@ -1,7 +1,8 @@
 //! Contacts between entities: what begins in something else, and what sinks into it.
 //!
-//! Model: a thing is pressed into what it touches below it by its own weight and by what stands on it, in equal shares; what touches
-//! nothing will come down on what is the first below it. The stiffness is that of a run ([`Contacts`]), on one point.
+//! Model: a thing is pressed into what it touches below it by its own weight and by what stands on it, in equal shares; what
+//! touches nothing will come down on what is the first below it. The stiffness is that of a run ([`Contacts`]), on one
+//! point.
 
 #![allow(non_snake_case)] // Frames are capital letters.
 

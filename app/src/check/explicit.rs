@@ -2,9 +2,10 @@
 //!
 //! Model: a body on the springs and dampers of all contacts that it begins with, or of any other, four points for a face, one for
 //! what is round, or of a finger; as it hops, rocks or rolls. A tick of such an integrator multiplies what moves there by a
-//! matrix of two rows; where one of its eigenvalues is larger than 1 in size, every swing is larger than the last one. With `c = k dt^2 / m` and `d = b dt / m`, Euler's method with the new
-//! velocity stands `c + 2 d < 4`; the finger's spring is described from where the body would be at the tick's end, which makes d
-//! larger by c. The eigenvalues z of the equation give `1 + z + z^2/2 + z^3/6 + z^4/24` to Runge and Kutta.
+//! matrix of two rows; where one of its eigenvalues is larger than 1 in size, every swing is larger than the last one. With
+//! `c = k dt^2 / m` and `d = b dt / m`, Euler's method with the new velocity stands `c + 2 d < 4`; the finger's spring is
+//! described from where the body would be at the tick's end, which makes d larger by c. The eigenvalues z of the
+//! equation give `1 + z + z^2/2 + z^3/6 + z^4/24` to Runge and Kutta.
 
 #![allow(non_snake_case)] // Frames are capital letters.
 
@@ -68,7 +69,7 @@ pub(super) fn all(rig: &Rig, entities: &[Entity], pairs: &[Pair]) -> Option<Stri
     let names: Vec<String> = thrown.map(|&index| rig.scene.entities[index].name.clone()).collect();
     (!names.is_empty()).then(|| {
         format!(
-            "`integrator = \"{}\"` throws away {}: too light for springs and dampers as stiff at {} Hz; leave out \
+            "`integrator = \"{}\"` may throw away {}: they are light for springs and dampers as stiff at {} Hz; leave out \
              `integrator`, which is to compare with only",
             integrator.name(),
             in_words(&names),
@@ -77,8 +78,8 @@ pub(super) fn all(rig: &Rig, entities: &[Entity], pairs: &[Pair]) -> Option<Stri
     })
 }
 
-/// The most that a body gives way to springs of one stiffness at all its points on something flat, by their stiffness (1/kg): as it
-/// hops, as it rocks about an axis of its own, or as a round one rolls.
+/// The most that a body gives way to springs at all its points on something flat, by the stiffness of one (1/kg): as it hops,
+/// as it rocks about an axis of its own, or as a round one rolls.
 fn gives_per_kg(entity: &Entity, body: &Body) -> f64 {
     let hops = points(entity) / body.mass.mass_kg;
     let Some(around) =

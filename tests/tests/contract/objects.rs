@@ -480,7 +480,7 @@ fn check_tells_by_what_stands_on_it_how_deep_each_of_a_stack_sinks_into_the_one_
     let place = Workplace::new();
     place.write(
         "scene.toml",
-        &format!("[[finger]]\nstart_m = [0, 1, 0]\n{floor}{}{}{}", cube(0), cube(1), cube(2)),
+        format!("[[finger]]\nstart_m = [0, 1, 0]\n{floor}{}{}{}", cube(0), cube(1), cube(2)),
     );
     let said = place.run(["check", "scene.toml"]).out;
     for (pair, depth_mm) in [
@@ -498,7 +498,7 @@ fn check_tells_by_what_stands_on_it_how_deep_each_of_a_stack_sinks_into_the_one_
 fn check_tells_what_falls_on_what_and_how_thin_it_is_whichever_way_it_is_turned() {
     let told = |things: &str| {
         let place = Workplace::new();
-        place.write("scene.toml", &format!("[[finger]]\nstart_m = [0, 3, 0]\n{things}"));
+        place.write("scene.toml", format!("[[finger]]\nstart_m = [0, 3, 0]\n{things}"));
         place.run(["check", "scene.toml"]).out
     };
     let cube = |name: &str, at: [f64; 3], size: [f64; 3], more: &str| {
@@ -543,7 +543,7 @@ fn check_does_not_advise_what_is_so_already() {
         "[[entity]]\nname = \"floor\"\nshape = { kind = \"plane\", normal = [0, 1, 0], offset_m = 0 }\n";
     let place = Workplace::new();
     let tower: String = (0..120).map(cube).collect();
-    place.write("scene.toml", &format!("[[finger]]\nstart_m = [0, 1, 0]\n{floor}{tower}"));
+    place.write("scene.toml", format!("[[finger]]\nstart_m = [0, 1, 0]\n{floor}{tower}"));
     let said = place.run(["check", "scene.toml"]).out;
     assert!(said.contains("make it thicker") && !said.contains("by-mass"), "{said}");
 }
@@ -568,18 +568,20 @@ fn check_tells_what_an_integrator_throws_away() {
              shape = {{ kind = \"plane\", normal = [0, 1, 0], offset_m = 0 }}\n{cubes}"
         )
     };
-    for (integrator, mass_kg, is_thrown) in [
-        ("thesis-euler", 0.001, true),
-        ("thesis-euler", 1.0, false),
-        ("rk4", 0.0005, true),
-        ("rk4", 1.0, false),
-        ("implicit", 0.0005, false),
+    for (integrator, mass_kg, height_m, count, is_thrown) in [
+        ("thesis-euler", 0.001, 0.04, 1, true),
+        ("thesis-euler", 0.001, 0.005, 1, true),
+        ("thesis-euler", 0.003, 0.04, 6, true),
+        ("thesis-euler", 1.0, 0.04, 1, false),
+        ("rk4", 0.0005, 0.04, 1, true),
+        ("rk4", 1.0, 0.04, 1, false),
+        ("implicit", 0.0005, 0.04, 1, false),
     ] {
-        let scene = scene(integrator, mass_kg, 0.04, 1);
+        let scene = scene(integrator, mass_kg, height_m, count);
         let place = Workplace::new();
         place.write("scene.toml", &scene);
         let said = place.run(["check", "scene.toml"]).out;
-        assert_eq!(said.contains("throws away cube"), is_thrown, "{integrator} {mass_kg}: {said}");
+        assert_eq!(said.contains("may throw away cube"), is_thrown, "{integrator} {mass_kg}: {said}");
         let fastest =
             played(&scene, &alone(1.0)).body("cube").iter().map(|at| at.velocity.norm()).fold(0.0, f64::max);
         // It falls by a millimetre: 0.14 m/s.

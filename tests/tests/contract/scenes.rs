@@ -360,10 +360,13 @@ fn check_judges_effects_and_contacts_together() {
     assert!(told.iter().any(|it| it.starts_with("ball, other together may swing")), "{told:?}");
 }
 
+/// Nothing falls.
+const WEIGHTLESS: &str = "gravity_m_s2 = [0.0, 0.0, 0.0]\n";
+
 /// A finger over a cube of this size, mass and place.
 fn with_cube(size: &str, mass: &str, place: &str) -> String {
     format!(
-        "gravity_m_s2 = [0.0, 0.0, 0.0]\n[[finger]]\nstart_m = [0.0, 0.2, 0.0]\n[[entity]]\nname = \"cube\"\n\
+        "[[finger]]\nstart_m = [0.0, 0.2, 0.0]\n[[entity]]\nname = \"cube\"\n\
          shape = {{ kind = \"box\", size_m = {size} }}\nmass_kg = {mass}\nposition_m = {place}\n"
     )
 }
@@ -371,7 +374,8 @@ fn with_cube(size: &str, mass: &str, place: &str) -> String {
 #[test]
 fn check_tells_the_size_the_place_and_the_mass_of_everything() {
     let place = Workplace::new();
-    place.write("scene.toml", with_cube("[0.05, 0.1, 0.05]", "0.1", "[0.0, 0.05, 0.0]"));
+    let cube = with_cube("[0.05, 0.1, 0.05]", "0.1", "[0.0, 0.05, 0.0]");
+    place.write("scene.toml", format!("{WEIGHTLESS}{cube}"));
     let said = check(&place, &["scene.toml"]);
     assert!(
         said.out.contains("cube: box, 0.05 x 0.1 x 0.05 m, at (0, 0.05, 0) m, 0.1 kg (400 kg/m^3)"),
@@ -524,7 +528,8 @@ fn check_suspects_numbers_of_another_unit() {
 #[test]
 fn check_suspects_hands_and_layouts_of_another_unit() {
     let place = Workplace::new();
-    place.write("scene.toml", with_cube("[0.05, 0.05, 0.05]", "0.1", "[0.0, 0.0, 0.0]"));
+    let cube = with_cube("[0.05, 0.05, 0.05]", "0.1", "[0.0, 0.0, 0.0]");
+    place.write("scene.toml", format!("{WEIGHTLESS}{cube}"));
     place.write("mm.csv", "t,f0_x,f0_y,f0_z\n0,0,80,0\n1,50,20,0\n");
     place.write("far.csv", "t,f0_x,f0_y,f0_z\n0,0,80,0\n");
     place.write("m.csv", "t,f0_x,f0_y,f0_z\n0,0,0.08,0\n1,0.05,0.02,0\n");

@@ -220,7 +220,7 @@ fn a_tower_of_forty_stands_and_sinks_by_a_sum() {
 fn a_tower_that_is_not_quite_straight_stands_up_to_where_its_springs_buckle() {
     const EDGE_M: f64 = 0.02;
     let leans_m = |count: u32| {
-        let aside = |place: u32| if place % 3 == 0 { 1e-4 } else { 0.0 };
+        let aside = |place: u32| if place.is_multiple_of(3) { 1e-4 } else { 0.0 };
         let thing = |place: u32| {
             let at = Isometry3::translation(aside(place), EDGE_M * (f64::from(place) + 0.5), 0.0);
             (object(Cuboid::new([EDGE_M; 3]).unwrap(), at, 1000.0, 0.5), 0.1)
