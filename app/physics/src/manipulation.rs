@@ -152,7 +152,7 @@ impl Manipulation {
             spare_j: Vec::with_capacity(places),
             solver: Solver::with_capacity(room, places),
             hand: Hand::new(&[], count),
-            restitution: Restitution::with_capacity(room),
+            restitution: Restitution::with_capacity(room, places),
             sets: Sets::with_capacity(count),
             touching: 0,
             pressing: 0,
@@ -189,7 +189,7 @@ impl Manipulation {
         self.rows = Vec::with_capacity(room);
         self.solver = Solver::with_capacity(room, places);
         self.stages = Stages::with_capacity(room, places);
-        self.restitution = Restitution::with_capacity(room);
+        self.restitution = Restitution::with_capacity(room, places);
         self.fixed = Vec::with_capacity(room);
         self
     }

@@ -30,8 +30,8 @@ pub(crate) struct Restitution {
 }
 
 impl Restitution {
-    pub(crate) fn with_capacity(rows: usize) -> Self {
-        Self { meetings: Vec::with_capacity(rows), cascade: Cascade::with_capacity(rows) }
+    pub(crate) fn with_capacity(rows: usize, bodies: usize) -> Self {
+        Self { meetings: Vec::with_capacity(rows), cascade: Cascade::with_capacity(rows, bodies) }
     }
 
     /// Whether two bodies met at this row in the last tick.

@@ -22,8 +22,10 @@ use crate::pair::HARD;
 use crate::row::Row;
 use crate::solver::{Motion, Solver};
 
-/// The most pairs that meet in a tick.
+/// The most pairs that meet in a tick, among many.
 const MAX_MEETINGS: usize = 128;
+/// How often a body alone meets what is fixed in a tick, at most.
+const MAX_OF_ONE: usize = 64;
 /// The most points of two that meet.
 const MAX_POINTS: usize = 32;
 /// Roundings of where bodies are \[m\]: what closes at once closes at the same time.
@@ -34,6 +36,9 @@ const ROUNDING_M: f64 = 1e-12;
 pub(super) struct Cascade {
     /// Of each row, as far as any has met \[N s\].
     impulses_W: Vec<Vector3<f64>>,
+    /// Meetings by the bodies of their rows, and where those of each begin.
+    order: Vec<usize>,
+    starts: Vec<usize>,
     /// Of the two that meet now: their meetings, points and motions.
     meet: Vec<usize>,
     rows: Vec<Row>,
@@ -44,9 +49,11 @@ pub(super) struct Cascade {
 }
 
 impl Cascade {
-    pub(super) fn with_capacity(rows: usize) -> Self {
+    pub(super) fn with_capacity(rows: usize, bodies: usize) -> Self {
         Self {
             impulses_W: Vec::with_capacity(rows),
+            order: Vec::with_capacity(rows),
+            starts: Vec::with_capacity(bodies + 2),
             meet: Vec::with_capacity(MAX_POINTS),
             rows: Vec::with_capacity(MAX_POINTS),
             motions: Vec::with_capacity(2),
@@ -75,12 +82,20 @@ impl Cascade {
     ) {
         let of_many = meetings.iter_mut().filter(|meeting| meeting.is_among_many);
         of_many.for_each(|meeting| meeting.gap_m = open(meeting.gap_m));
-        for _ in 0..MAX_MEETINGS {
-            let Some(two) = next(meetings, rows, motions, dt_s) else { break };
-            if self.impulses_W.is_empty() {
-                self.impulses_W.resize(rows.len(), Vector3::zeros());
+        if meetings.iter().any(|meeting| meeting.will_bounce(dt_s)) {
+            self.impulses_W.resize(rows.len(), Vector3::zeros());
+            self.sort(meetings, rows, motions.len());
+            for body in 0..motions.len() {
+                for _ in 0..MAX_OF_ONE {
+                    let of_body = &self.order[self.starts[body]..self.starts[body + 1]];
+                    let Some(two) = next(meetings, of_body, false, rows, motions, dt_s) else { break };
+                    self.meet(two, meetings, rows, (motions, changes), dt_s);
+                }
             }
-            self.meet(two, meetings, rows, (motions, changes), dt_s);
+            for _ in 0..MAX_MEETINGS {
+                let Some(two) = next(meetings, &self.order, true, rows, motions, dt_s) else { break };
+                self.meet(two, meetings, rows, (motions, changes), dt_s);
+            }
         }
         for meeting in meetings {
             let row = &mut rows[meeting.row];
@@ -92,6 +107,22 @@ impl Cascade {
                 // What bounces does not roll: a torque as large as the impulse would drive it.
                 (row.torsion, row.rolling) = Default::default();
             }
+        }
+    }
+
+    /// By counting.
+    fn sort(&mut self, meetings: &[Meeting], rows: &[Row], bodies: usize) {
+        self.starts.clear();
+        self.starts.resize(bodies + 2, 0);
+        let body = |meeting: &Meeting| rows[meeting.row].body;
+        meetings.iter().for_each(|meeting| self.starts[body(meeting) + 2] += 1);
+        (1..self.starts.len()).for_each(|at| self.starts[at] += self.starts[at - 1]);
+        self.order.clear();
+        self.order.resize(meetings.len(), 0);
+        for (at, meeting) in meetings.iter().enumerate() {
+            let next = &mut self.starts[body(meeting) + 1];
+            self.order[*next] = at;
+            *next += 1;
         }
     }
 
@@ -137,8 +168,9 @@ impl Cascade {
         self.rows.clear();
         self.meet.clear();
         let mut are_many = false;
-        let own = meetings.iter().enumerate().filter(|(_, meeting)| is_of(&rows[meeting.row], body, other));
-        for (at, meeting) in own {
+        let of_body = &self.order[self.starts[body]..self.starts[body + 1]];
+        for &at in of_body.iter().filter(|&&at| rows[meetings[at].row].other == other) {
+            let meeting = &meetings[at];
             let Some(leaves_m_s) = meeting.leaves_m_s(dt_s).filter(|_| meeting.bounces()) else { continue };
             if self.meet.len() == MAX_POINTS {
                 break;
@@ -163,15 +195,21 @@ impl Cascade {
     }
 }
 
-/// Which two meet next: a body, and another one or what is fixed. Lets the time pass until then.
+/// Which two meet next of these: a body, and another one or what is fixed. Among many it lets the time pass until then.
 fn next(
     meetings: &mut [Meeting],
+    which: &[usize],
+    are_many: bool,
     rows: &[Row],
     motions: &[Motion],
     dt_s: f64,
 ) -> Option<(usize, Option<usize>)> {
     let mut first: Option<([f64; 2], &Row)> = None;
-    for meeting in meetings.iter_mut().filter(|meeting| meeting.bounces()) {
+    for &at in which {
+        let meeting = &mut meetings[at];
+        if meeting.is_among_many != are_many || !meeting.bounces() {
+            continue;
+        }
         let row = &rows[meeting.row];
         meeting.look(row, motions);
         if meeting.leaves_m_s(dt_s).is_some() {
@@ -180,7 +218,7 @@ fn next(
         }
     }
     let ([after_s, _], row) = first?;
-    for meeting in meetings.iter_mut().filter(|meeting| meeting.is_among_many) {
+    for meeting in meetings.iter_mut().filter(|meeting| are_many && meeting.is_among_many) {
         meeting.gap_m = open(meeting.gap_m - meeting.approaches_m_s * after_s);
     }
     Some((row.body, row.other))
@@ -189,8 +227,4 @@ fn next(
 /// A gap, or none where it is of roundings (m).
 fn open(gap_m: f64) -> f64 {
     if gap_m > ROUNDING_M { gap_m } else { 0.0 }
-}
-
-fn is_of(row: &Row, body: usize, other: Option<usize>) -> bool {
-    row.body == body && row.other == other
 }

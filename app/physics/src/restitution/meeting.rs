@@ -109,6 +109,11 @@ impl Meeting {
         self.restitution > 0.0
     }
 
+    /// Whether it bounces in this tick, as it was looked at last.
+    pub(super) fn will_bounce(&self, dt_s: f64) -> bool {
+        self.bounces() && self.leaves_m_s(dt_s).is_some()
+    }
+
     /// It has met: what was owed to it is paid.
     pub(super) fn has_met(&mut self) {
         self.owed_m_s = 0.0;
