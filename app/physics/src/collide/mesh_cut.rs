@@ -22,8 +22,6 @@ pub(super) struct WayOut<'w> {
     pub(super) along: Vector3<f64>,
     /// It is no longer \[m\].
     pub(super) most_m: f64,
-    /// The two touch already: before, corners press first.
-    pub(super) is_pressed: bool,
     /// So much nearer the two may be that do not touch yet \[m\].
     pub(super) ahead_m: f64,
     /// From a point to where nothing else is pressed \[m\].
@@ -55,7 +53,7 @@ impl Edge {
         if let Some(hits) = pressed_twice(mesh, &hits, way) {
             return [self.dips(mesh, hits, way), None];
         }
-        [0, 1].map(|at| cut(mesh, hits[at].as_ref().filter(|_| way.is_pressed)?, ways[at].1, way))
+        [0, 1].map(|at| cut(mesh, hits[at].as_ref()?, ways[at].1, way))
     }
 
     /// As if it were so much nearer.

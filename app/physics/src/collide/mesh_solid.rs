@@ -264,11 +264,6 @@ impl Place<'_> {
         self.patches.lift_M(self.number, point_M, sign, self.meeting.travel_m)
     }
 
-    /// Of a single place, corners press first.
-    fn is_pressed(&self) -> bool {
-        self.meeting.depth_m > 0.0 || self.patches.are_several()
-    }
-
     /// Single places' edges are stopped before they are in each other \[m\].
     fn ahead_m(&self) -> f64 {
         if self.patches.are_several() { 0.0 } else { self.meeting.reach_m }
@@ -331,8 +326,7 @@ impl Place<'_> {
     fn cuts_by_mesh(&mut self, edge: &Edge, about: About) {
         let lift = |point_M: &Vector3<f64>| self.lift_M(point_M, 1.0);
         let ahead_m = self.ahead_m();
-        let (along, is_pressed) = (self.meeting.normal_M, self.is_pressed());
-        let way = WayOut { along, most_m: self.way_m(), is_pressed, ahead_m, lift: &lift };
+        let way = WayOut { along: self.meeting.normal_M, most_m: self.way_m(), ahead_m, lift: &lift };
         let cuts = edge.cuts(self.mesh, &way);
         for (end, cut) in cuts.into_iter().enumerate() {
             if let Some(cut) = cut {
@@ -353,8 +347,7 @@ impl Place<'_> {
             let point_M = (X_MO * Point3::from(*point)).coords;
             turned(&patches.lift_M(number, &point_M, -1.0, meeting.travel_m))
         };
-        let (along, is_pressed) = (turned(&-meeting.normal_M), self.is_pressed());
-        let way = WayOut { along, most_m, is_pressed, ahead_m: self.ahead_m(), lift: &lift };
+        let way = WayOut { along: turned(&-meeting.normal_M), most_m, ahead_m: self.ahead_m(), lift: &lift };
         let from = place(corner.point_M(mesh));
         corner.for_each_edge(mesh, |to, face, edge| {
             let cuts = Edge { ends: [from, place(to)] }.cuts(second, &way);

@@ -73,3 +73,37 @@ fn cubes_that_are_put_a_little_aside_stand_on_each_other() {
         }
     }
 }
+
+/// With both ends of the edge that it comes down on beside the other one.
+#[test]
+fn cubes_that_come_down_on_an_edge_lie_flat_on_each_other() {
+    const HALF_M: f64 = 0.02;
+    let cube = block([2.0 * HALF_M; 3], [1; 3]);
+    for rolled in [2.0, 4.0, 7.0, 15.0_f64].map(f64::to_radians) {
+        for turned in [45.0, 44.0, 30.0, 20.0, 10.0_f64].map(f64::to_radians) {
+            let turn = UnitQuaternion::from_axis_angle(&Vector3::y_axis(), turned)
+                * UnitQuaternion::from_axis_angle(&Vector3::z_axis(), rolled);
+            let above_m = HALF_M * (1.0 + rolled.cos() + rolled.sin()) + 1e-3;
+            let X_WB = Isometry3::from_parts(Vector3::new(0.0, above_m, 0.0).into(), turn);
+            let entities = vec![
+                object(cube.clone(), Isometry3::identity(), 1000.0, 0.5),
+                object(cube.clone(), X_WB, 1000.0, 0.5),
+            ];
+            let bodies = [(1, body(&entities[1], MASS))];
+            let contact_stiffness = ContactStiffness::ByMass { damping_ratio: 1.0 };
+            let settings = Settings { contact_stiffness, ..Settings::default() };
+            let mut world = World::new(entities, &bodies, settings, 0);
+            for _ in 0..600 {
+                world.step(&[]);
+            }
+            let now = world.entities[1].X_WB;
+            let leans = (now.rotation * Vector3::y()).y.min(1.0).acos();
+            let deep_m = 2.0 * HALF_M - now.translation.y;
+            // As deep as a corner comes in a tick of its fall, where only what is in each other is found.
+            assert!(
+                (-1e-6..1e-4).contains(&deep_m) && leans < 6e-3,
+                "{rolled} {turned}: {deep_m} m, {leans} rad"
+            );
+        }
+    }
+}
