@@ -63,8 +63,8 @@ impl Edge {
         let hits = [mesh.first_hit(&a, &b)?, mesh.first_hit(&b, &a)?].map(Some);
         let way = WayOut { most_m: way.most_m.max(2.0 * way.ahead_m), ..*way };
         let cut = Self { ends: [a, b] }.dips(mesh, pressed_twice(mesh, &hits, &way)?, &way)?;
-        let gap_m = cut.gap_m - cut.out.dot(&nearer_M);
-        (gap_m > 0.0).then_some(Cut { on_edge: cut.on_edge - nearer_M, gap_m, ..cut })
+        let (on_edge, gap_m) = (cut.on_edge - nearer_M, cut.gap_m - cut.out.dot(&nearer_M));
+        (gap_m > 0.0).then_some(Cut { on_edge, on_mesh: on_edge - cut.out * gap_m, gap_m, ..cut })
     }
 
     /// Where it dips deepest through a ridge.

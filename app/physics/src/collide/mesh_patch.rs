@@ -63,6 +63,14 @@ impl Patches {
         self.all[1..].iter().any(|patch| patch.is_known)
     }
 
+    /// Whether all others look about as this one does, and press nothing: they may be sides of one round back.
+    pub(super) fn is_alone(&self, number: usize) -> bool {
+        let own_M = &self.all[number].normal_M;
+        let is_another =
+            |patch: &Patch| patch.is_known && (patch.depth_m > 0.0 || patch.normal_M.dot(own_M) < AGREES);
+        !self.all.iter().enumerate().any(|(at, patch)| at != number && is_another(patch))
+    }
+
     /// True if any place is pressed.
     pub(super) fn are_pressed(&self) -> bool {
         self.all.iter().any(Patch::is_pressed)

@@ -202,7 +202,7 @@ impl Place<'_> {
     /// Of one place among several, what lies behind it does not count; but what lies beside it does, where that is the end
     /// of a long edge.
     fn limits<'l>(&self, of: &Mesh, limits: &'l [Linear; 5]) -> &'l [Linear] {
-        match (self.patches.are_several(), of.vertices().len() <= COARSE) {
+        match (!self.patches.is_alone(self.number), of.vertices().len() <= COARSE) {
             (false, _) => &limits[..4],
             (true, false) => limits,
             (true, true) => &limits[4..],
@@ -217,7 +217,7 @@ impl Place<'_> {
 
     /// An edge that is cut off by the outline of a single place leaves a vertex so far beside it \[m\].
     fn beside_m(&self, mesh: &Mesh) -> f64 {
-        if self.patches.are_several() { 0.0 } else { mesh.longest_edge_m() }
+        if self.patches.is_alone(self.number) { mesh.longest_edge_m() } else { 0.0 }
     }
 
     fn of_vertex(&self, at_M: &Vector3<f64>) -> Option<Seen> {
@@ -266,7 +266,7 @@ impl Place<'_> {
 
     /// Single places' edges are stopped before they are in each other \[m\].
     fn ahead_m(&self) -> f64 {
-        if self.patches.are_several() { 0.0 } else { self.meeting.reach_m }
+        if self.patches.is_alone(self.number) { self.meeting.reach_m } else { 0.0 }
     }
 
     /// The other one's points against the mesh.
@@ -365,7 +365,7 @@ impl Place<'_> {
     /// one that is on it.
     fn push(&mut self, contact: Contact) {
         let is_near = contact.gap_m <= self.meeting.reach_m;
-        let is_single = self.meeting.depth_m > 0.0 && !self.patches.are_several();
+        let is_single = self.meeting.depth_m > 0.0 && self.patches.is_alone(self.number);
         let is_beside =
             is_single && contact.gap_m >= 0.0 && contact.normal_M.dot(&self.meeting.normal_M) < BESIDE;
         if !is_near || is_beside || self.patches.belongs_elsewhere(self.number, &contact.normal_M) {

@@ -134,3 +134,33 @@ fn round_bars_of_triangles_and_closed_forms_lie_across_each_other() {
         }
     }
 }
+
+/// Across two that lie free on a floor, off the middle, in either order.
+#[test]
+fn a_round_bar_lies_across_two_others_wherever_they_are() {
+    for (sides, apart_m) in
+        [8, 12, 16, 48].into_iter().flat_map(|sides| [0.024, 0.03, 0.04, 0.06].map(|by| (sides, by)))
+    {
+        for is_first in [false, true] {
+            let shape = bar(sides, 1, FRAC_PI_2 + PI / f64::from(sides));
+            let reach_m = reaches_m(sides, false);
+            let across = UnitQuaternion::from_axis_angle(&Vector3::y_axis(), FRAC_PI_2);
+            let above = Isometry3::from_parts((Vector3::y() * (3.0 * reach_m + 2e-4)).into(), across);
+            let below = |x: f64| Isometry3::translation(x, reach_m + 1e-4, 0.0);
+            let mut poses = vec![below(-0.5 * apart_m), below(0.5 * apart_m)];
+            poses.insert(if is_first { 0 } else { 2 }, above);
+            let mut entities: Vec<Entity> = vec![floor(0.0, 1000.0, 0.5)];
+            entities.extend(poses.iter().map(|at| object(shape.clone(), *at, 1000.0, 0.5)));
+            let bodies: Vec<_> = (1..4).map(|at| (at, body(&entities[at], 0.05))).collect();
+            let contact_stiffness = ContactStiffness::ByMass { damping_ratio: 1.0 };
+            let settings = Settings { contact_stiffness, ..Settings::default() };
+            let mut world = World::new(entities, &bodies, settings, 0);
+            for _ in 0..300 {
+                world.step(&[]);
+            }
+            let at_m = world.entities[if is_first { 1 } else { 3 }].X_WB.translation.y;
+            let told = format!("{sides} sides, {apart_m} m apart, {is_first}");
+            assert_rests(at_m - 2.0 * reach_m, reach_m, 3e-5, &told);
+        }
+    }
+}
