@@ -72,7 +72,7 @@ pub(crate) struct Start<'t> {
     pub(crate) bodies: &'t [Body],
     /// As they are without contacts, at the end of the tick.
     pub(crate) motions: &'t [Motion],
-    /// What of that the tick adds to what they were.
+    /// Part of that which the tick adds to what they were.
     pub(crate) changes: &'t [Motion],
     /// The most that any point of each moves per time \[m/s\].
     pub(crate) speeds_m_s: &'t [f64],
@@ -445,7 +445,7 @@ pub(crate) fn is_near(a: &Entity, b: &Entity, reach_m: f64) -> bool {
         }
 }
 
-/// What is squeezed by something driven comes out no faster \[m/s\].
+/// Speed at which things come out at most that something driven squeezes \[m/s\].
 const SQUEEZED_M_S: f64 = 1.0;
 /// Contact points are looked for from this distance on \[m\].
 pub(crate) const REACH_M: f64 = 1e-3;

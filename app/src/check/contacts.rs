@@ -70,7 +70,7 @@ impl Pair {
     }
 }
 
-/// What stands or will fall on something else.
+/// A thing that stands or will fall on something else.
 struct Stand {
     upper: usize,
     lower: usize,
@@ -96,7 +96,7 @@ impl Looks<'_> {
             .then(|| format!("{name} begins {:.2} mm deep in {other}, and will be pushed out", depth_m * 1e3))
     }
 
-    /// Who stands on whom, from above to below, each with what presses there; and what falls for ever.
+    /// All that stands on something, from above to below, with the load there; and things that fall for ever.
     fn stands(&self, pairs: &[Pair]) -> (Vec<Stand>, Vec<usize>) {
         let up_W = -self.rig.scene.gravity_m_s2.try_normalize(0.0).unwrap_or_default();
         let height = |index: usize| {
@@ -139,7 +139,7 @@ impl Looks<'_> {
         (stands, falls)
     }
 
-    /// What it would come down on from where it is.
+    /// The entity that it would come down on from its place.
     fn first_below(&self, upper: usize, up_W: &Vector3<f64>) -> Option<usize> {
         let (entity, around) = (&self.entities[upper], Aabb::of_entity(&self.entities[upper])?);
         let falls_m = |other: usize| {
@@ -205,7 +205,7 @@ impl Looks<'_> {
     }
 }
 
-/// How far a box falls until it is on a half-space (m); `None`: never.
+/// Way of a box until it is on a half-space (m); `None`: it never is.
 fn falls_on_plane(around: &Aabb, entity: &Entity, plane: &Plane, up_W: &Vector3<f64>) -> Option<f64> {
     let normal_W = entity.X_WB.rotation * plane.normal_B();
     let half_m = (around.high_W - around.low_W).abs() * 0.5;
@@ -215,7 +215,7 @@ fn falls_on_plane(around: &Aabb, entity: &Entity, plane: &Plane, up_W: &Vector3<
     (down > BESIDE).then_some((above_m / down).max(0.0))
 }
 
-/// How far a box falls until it is on another one (m); `None`: never.
+/// Way of a box until it is on another one (m); `None`: it never is.
 fn falls_on_box(around: &Aabb, other: &Aabb, up_W: &Vector3<f64>) -> Option<f64> {
     let (mut first_m, mut last_m) = (0.0_f64, f64::INFINITY);
     for axis in 0..3 {
@@ -266,7 +266,7 @@ fn near_pairs(rig: &Rig, entities: &[Entity], mut meet: impl FnMut(usize, usize)
     }
 }
 
-/// Where they are nearest to each other: how far apart they are there (m), and the normal to the first one.
+/// Distance of the two where they are nearest to each other (m), and the normal to the first one there.
 fn nearest(a: &Entity, b: &Entity) -> (f64, Vector3<f64>) {
     let far = (f64::INFINITY, Vector3::zeros());
     let is_turned = !is_collidable(&a.shape, &b.shape);
@@ -284,9 +284,9 @@ fn nearest(a: &Entity, b: &Entity) -> (f64, Vector3<f64>) {
     nearest.map_or(far, |point| (point.gap_m, if is_turned { -point.normal_W } else { point.normal_W }))
 }
 
-/// What is nearer stands on each other \[m\].
+/// Things that are nearer stand on each other \[m\].
 const TOUCH_M: f64 = 1e-3;
-/// What is farther by less is reached at once \[m\].
+/// Things that are farther by less are reached at once \[m\].
 const AT_ONCE_M: f64 = 1e-5;
 /// Cosine between a normal and what is up where nothing is carried.
 const BESIDE: f64 = 0.2;

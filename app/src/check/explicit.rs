@@ -1,4 +1,4 @@
-//! What integrators throw away that take forces from the beginning of a tick.
+//! Bodies that integrators throw away which take forces from the beginning of a tick.
 //!
 //! Model: a body on the springs and dampers of all contacts that it begins with, or of any other, four points for a face, one for
 //! what is round, or of a finger; as it hops, rocks or rolls. A tick of such an integrator multiplies what moves there by a

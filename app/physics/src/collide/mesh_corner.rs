@@ -169,7 +169,7 @@ impl<'m> Fan<'m> {
     }
 }
 
-/// Whether the edge that begins at a face's corner sticks out.
+/// True of an edge that sticks out; it begins at a face's corner.
 fn bends(mesh: &Mesh, face: &Face, corner: usize) -> bool {
     let ends = [corner, (corner + 1) % 3].map(|end| mesh.vertices()[face.vertices[end] as usize]);
     let edge = ends[1] - ends[0];

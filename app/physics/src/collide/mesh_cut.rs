@@ -1,4 +1,4 @@
-//! Where an edge of one solid is cut off by a mesh: the crossing of two edges.
+//! Crossings of two edges: an edge of one solid is cut off by a mesh.
 //!
 //! Problem: a cube that lies half over the end of a table has two corners on it, and two more points where its lower edges
 //! cross that of the table; without these it would fall off while its middle is still over the table.
@@ -67,7 +67,7 @@ impl Edge {
         (gap_m > 0.0).then_some(Cut { on_edge, on_mesh: on_edge - cut.out * gap_m, gap_m, ..cut })
     }
 
-    /// Where it dips deepest through a ridge.
+    /// The place at which it dips deepest through a ridge.
     fn dips(&self, mesh: &Mesh, hits: [&Hit; 2], way: &WayOut<'_>) -> Option<Cut> {
         let faces = hits.map(|hit| &mesh.faces()[hit.face as usize]);
         let [from, to] = hits.map(|hit| hit.point_B);
@@ -87,7 +87,7 @@ impl Edge {
     }
 }
 
-/// Where it goes in from either end, if that is through faces that are pressed.
+/// Both hits, if the edge goes in through pressed faces from either end.
 fn pressed_twice<'h>(mesh: &Mesh, hits: &'h [Option<Hit>; 2], way: &WayOut<'_>) -> Option<[&'h Hit; 2]> {
     let [Some(first), Some(last)] = hits else { return None };
     let is_pressed = |hit: &Hit| mesh.faces()[hit.face as usize].normal_B.dot(&way.along) > ASIDE;

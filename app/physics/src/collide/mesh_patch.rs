@@ -63,7 +63,7 @@ impl Patches {
         self.all[1..].iter().any(|patch| patch.is_known)
     }
 
-    /// Whether all others look about as this one does, and press nothing: they may be sides of one round back.
+    /// True if all others look about as this one does, and press nothing: they may be sides of one round back.
     pub(super) fn is_alone(&self, number: usize) -> bool {
         let own_M = &self.all[number].normal_M;
         let is_another =

@@ -361,7 +361,7 @@ impl Place<'_> {
         });
     }
 
-    /// What is another place's, that one finds. A corner that is beside a single place by next to nothing would take the room of
+    /// Points of another place that one finds. A corner that is beside a single place by next to nothing would take the room of
     /// one that is on it.
     fn push(&mut self, contact: Contact) {
         let is_near = contact.gap_m <= self.meeting.reach_m;

@@ -129,7 +129,7 @@ impl Bounce {
     }
 }
 
-/// What impulses may seem to put into a body per time, twice, for what gravity takes from it.
+/// Power that impulses may seem to put into a body, twice, for what gravity takes from it.
 fn free_w(motion: &Motion, change: &Motion, dt_s: f64) -> f64 {
     if motion.inverse_mass > 0.0 {
         change.velocity_W.norm_squared() / (motion.inverse_mass * dt_s)

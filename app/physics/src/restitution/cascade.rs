@@ -24,7 +24,7 @@ use crate::solver::{Motion, Solver};
 
 /// The most pairs that meet in a tick, among many.
 const MAX_MEETINGS: usize = 128;
-/// How often a body alone meets what is fixed in a tick, at most.
+/// The most meetings of a body alone with what is fixed in a tick.
 const MAX_OF_ONE: usize = 64;
 /// The most points of two that meet.
 const MAX_POINTS: usize = 32;
@@ -195,7 +195,7 @@ impl Cascade {
     }
 }
 
-/// Which two meet next of these: a body, and another one or what is fixed. Among many it lets the time pass until then.
+/// The two of these that meet next: a body, and another one or what is fixed. Among many it lets the time pass until then.
 fn next(
     meetings: &mut [Meeting],
     which: &[usize],

@@ -42,7 +42,7 @@ pub(crate) struct Meeting {
     pub(super) approaches_m_s: f64,
     /// By how much its normal velocity grows in the tick without any contact \[m/s\].
     grows_m_s: f64,
-    /// What of that is gravity, against the normal \[m/s\].
+    /// Part of that which is gravity's, against the normal \[m/s\].
     falls_m_s: f64,
     /// What approaches no faster rests \[m/s\].
     calm_m_s: f64,
@@ -109,7 +109,7 @@ impl Meeting {
         self.restitution > 0.0
     }
 
-    /// Whether it bounces in this tick, as it was looked at last.
+    /// True of one that bounces in this tick, as it was looked at last.
     pub(super) fn will_bounce(&self, dt_s: f64) -> bool {
         self.bounces() && self.leaves_m_s(dt_s).is_some()
     }

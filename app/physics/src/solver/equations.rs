@@ -33,7 +33,7 @@ pub(super) struct Trial {
     pub(super) p: Vec<Vector6>,
     /// `u_0 + W p`.
     pub(super) moving: Vec<Motion>,
-    /// How fast each of them goes \[m/s\] and turns \[rad/s\].
+    /// Speed \[m/s\] and spin \[rad/s\] of each.
     speeds: Vec<[f64; 2]>,
     pub(super) left: Vec<Vector6>,
     /// Twice the kinetic energy of what is left \[J\].
@@ -88,7 +88,7 @@ impl Equations<'_> {
         }));
     }
 
-    /// What is left at the trial's `p`.
+    /// Evaluates the equations at the trial's `p`: what is left of them.
     pub(super) fn evaluate(&self, rows: &[Row], trial: &mut Trial) {
         self.moving(trial);
         let Trial { p, moving, speeds, left, .. } = trial;

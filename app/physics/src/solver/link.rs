@@ -86,8 +86,8 @@ impl Link {
         })
     }
 
-    /// How fast the point goes and turns at most, all sides' roundings counted (m/s), of bodies that go (m/s) and turn
-    /// (rad/s) so fast.
+    /// The most speed of the point, all sides' roundings counted (m/s); `speeds` are those of bodies (m/s) and their spins
+    /// (rad/s).
     #[inline]
     pub(super) fn speed_m_s(&self, speeds: &[[f64; 2]]) -> f64 {
         let of_side = |(side, place): (usize, usize)| speeds[place][0] + speeds[place][1] * self.arms_m[side];

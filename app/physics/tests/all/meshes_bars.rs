@@ -47,7 +47,7 @@ fn bar(sides: u32, pieces: usize, turn: f64) -> Shape {
     meshes::build(soup).into()
 }
 
-/// How high the middle of the one is above that of the other after 0.3 s (m); the lower one is fixed.
+/// Height of the middle of the one above that of the other after 0.3 s (m); the lower one is fixed.
 fn rests_m(lower: &Shape, upper: &Shape, crossed: f64) -> f64 {
     // Forms are along y.
     let lying = |shape: &Shape| match shape {
