@@ -41,6 +41,13 @@ pub enum ContactStiffness {
     },
 }
 
+impl ContactStiffness {
+    /// Of each contact point by mass, among bodies of which the heaviest has this mass (kg) \[N/m\].
+    pub fn by_mass_n_per_m(heaviest_kg: f64) -> f64 {
+        heaviest_kg * SWINGS_RAD_S * SWINGS_RAD_S
+    }
+}
+
 /// Response and stiffness of contacts between entities.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Contacts {
@@ -75,7 +82,7 @@ impl Contacts {
         let own = match stiffness {
             ContactStiffness::AsFelt => None,
             ContactStiffness::ByMass { damping_ratio } | ContactStiffness::AsSaid { damping_ratio } => {
-                Some((heaviest_kg * SWINGS_RAD_S * SWINGS_RAD_S, damping_ratio))
+                Some((ContactStiffness::by_mass_n_per_m(heaviest_kg), damping_ratio))
             }
             ContactStiffness::Given { stiffness_n_per_m, damping_ratio } => {
                 Some((stiffness_n_per_m, damping_ratio))
@@ -135,7 +142,7 @@ impl ContactDamping {
     /// Coefficient at a point of this stiffness (N/m) where the two give way with a velocity per impulse of so much
     /// (1/kg) \[N s/m\].
     #[inline]
-    pub(crate) fn n_s_per_m(self, stiffness_n_per_m: f64, gives_per_kg: f64) -> f64 {
+    pub fn n_s_per_m(self, stiffness_n_per_m: f64, gives_per_kg: f64) -> f64 {
         match self {
             Self::Constant(damping_n_s_per_m) => damping_n_s_per_m,
             Self::Ratio(ratio) if gives_per_kg > 0.0 => {

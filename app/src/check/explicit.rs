@@ -9,11 +9,11 @@
 
 #![allow(non_snake_case)] // Frames are capital letters.
 
-use super::contacts::Pair;
+use super::near::Pair;
 use crate::rig::{Rig, in_words};
 use haptics::{Entity, Form, Shape};
 use nalgebra::{Complex, Isometry3};
-use physics::{Aabb, Body, ContactDamping, Integrator};
+use physics::{Aabb, Body, Integrator};
 use std::collections::BTreeMap;
 
 /// The warning of them, if there are any.
@@ -42,11 +42,8 @@ pub(super) fn all(rig: &Rig, entities: &[Entity], pairs: &[Pair]) -> Option<Stri
         let [one, both] = [gives_per_kg(index), (gives_per_kg(index) * gives_per_kg(other)).sqrt()]
             .map(|per_kg| per_kg * points);
         let (k, damping) = contacts.between(&entities[index], &entities[other]);
-        let b = match damping {
-            ContactDamping::Constant(b) => b,
-            ContactDamping::Ratio(ratio) => 2.0 * ratio * (k / gives_per_kg(index)).sqrt(),
-        };
-        [k * dt_s, b].map(|by_velocity| by_velocity * dt_s * (one + both))
+        [k * dt_s, damping.n_s_per_m(k, gives_per_kg(index))]
+            .map(|by_velocity| by_velocity * dt_s * (one + both))
     };
     let grows = |[c, d]: [f64; 2]| growth(integrator, c, d) > GROWS;
     let on_others = |index: usize| {

@@ -1,6 +1,6 @@
 //! What runs, but hardly as meant.
 
-use super::{contacts, explicit, together};
+use super::{contacts, explicit, near, together};
 use crate::rig::{Rig, in_words};
 use crate::study::stiffness::bounds::Theory;
 use crate::study::stiffness::case::{Axis, Case, Hand, Mode};
@@ -19,7 +19,7 @@ pub(super) fn all(rig: &Rig, whole: &Scene, entities: &[Entity]) -> Vec<String> 
     let mut warnings = too_stiff(rig, &mut stands);
     warnings.extend(too_damped(rig));
     warnings.extend(together::too_much(rig, entities, &mut stands));
-    let pairs = contacts::pairs(rig, entities);
+    let pairs = near::pairs(rig, entities);
     warnings.extend(contacts::all(rig, entities, &pairs));
     warnings.extend(explicit::all(rig, entities, &pairs));
     warnings.extend(inside(rig, entities));

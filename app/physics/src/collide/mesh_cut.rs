@@ -3,9 +3,9 @@
 //! Problem: a cube that lies half over the end of a table has two corners on it, and two more points where its lower edges
 //! cross that of the table; without these it would fall off while its middle is still over the table.
 //! Model: the edge enters the mesh through its side; from there the way along the contact's normal leads out through the
-//! face that is pressed. Its normal is the contact's, the length of the way the depth. Or it dips through a ridge, in by one pressed
-//! face and out by another, as through the back of a round bar: then the way out is across both edges, from where it
-//! is as far behind the one face as behind the other.
+//! face that is pressed. Its normal is the contact's, the length of the way the depth. Or it dips through a ridge, in by one
+//! pressed face and out by another, as through the back of a round bar: then the way out is across both edges, from where
+//! it is as far behind the one face as behind the other.
 //! Cost: four queries for an edge that meets nothing, one to four more for each end where it does.
 
 use haptics::mesh::{Face, Hit, Mesh};
@@ -48,7 +48,8 @@ impl Edge {
         let ways = [(&a, &b), (&b, &a)];
         let hits = ways.map(|(from, to)| mesh.first_hit(from, to));
         if let [None, None] = hits {
-            return [self.will_dip(mesh, way), None];
+            let will_dip = if way.ahead_m > 0.0 { self.will_dip(mesh, way) } else { None };
+            return [will_dip, None];
         }
         if let Some(hits) = pressed_twice(mesh, &hits, way) {
             return [self.dips(mesh, hits, way), None];

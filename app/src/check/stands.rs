@@ -1,0 +1,119 @@
+//! Loads: all that stands on something else, or will come down on it.
+//!
+//! Model: a thing is pressed into what it touches below it by its own weight and by what stands on it, in equal shares; what
+//! touches nothing will come down on what is the first below it.
+//! Limits: what is below is told by boxes along the axes of the world: of a ring, its hole too.
+
+#![allow(non_snake_case)] // Frames are capital letters.
+
+use super::near::Pair;
+use haptics::{Entity, Form, Plane, Shape};
+use nalgebra::Vector3;
+use physics::Aabb;
+use physics::collide::is_collidable;
+
+/// A thing that stands or will fall on something else.
+pub(super) struct Stand {
+    pub(super) upper: usize,
+    pub(super) lower: usize,
+    pub(super) load_n: f64,
+}
+
+/// All that stands on something, from above to below, with the load there; and things that fall for ever.
+pub(super) fn all(
+    entities: &[Entity],
+    pairs: &[Pair],
+    weights_n: &[f64],
+    up_W: &Vector3<f64>,
+) -> (Vec<Stand>, Vec<usize>) {
+    let height = |index: usize| {
+        let around = Aabb::of_entity(&entities[index]);
+        around.map_or(f64::NEG_INFINITY, |around| around.middle_W().dot(up_W))
+    };
+    let is_body = |index: usize| weights_n[index] > 0.0;
+    let mut below: Vec<Vec<(f64, usize)>> = vec![Vec::new(); entities.len()];
+    for pair in pairs.iter().filter(|pair| pair.touches()) {
+        let is_above = pair.normal_W.dot(up_W);
+        let (upper, lower) = if is_above >= 0.0 { (pair.one, pair.other) } else { (pair.other, pair.one) };
+        if is_body(upper) && is_above.abs() > BESIDE {
+            // Overlaps of whatever depth carry at once.
+            below[upper].push((pair.gap_m.max(0.0), lower));
+        }
+    }
+    let mut order: Vec<usize> = (0..entities.len()).filter(|&index| is_body(index)).collect();
+    order.sort_by(|&a, &b| height(b).total_cmp(&height(a)));
+    let (mut loads_n, mut stands, mut falls) = (weights_n.to_vec(), Vec::new(), Vec::new());
+    for upper in order {
+        // Of what is not quite touched, what is reached first carries it.
+        let least_m = below[upper].iter().map(|(gap_m, _)| *gap_m).fold(f64::INFINITY, f64::min);
+        let mut carries: Vec<usize> =
+            below[upper].iter().filter(|(gap_m, _)| *gap_m < least_m + AT_ONCE_M).map(|one| one.1).collect();
+        if carries.is_empty() {
+            match first_below(entities, upper, up_W) {
+                Some(lower) => carries.push(lower),
+                None => falls.push(upper),
+            }
+        }
+        let load_n = loads_n[upper] / carries.len() as f64;
+        for lower in carries {
+            loads_n[lower] += load_n;
+            stands.push(Stand { upper, lower, load_n });
+        }
+    }
+    (stands, falls)
+}
+
+/// The entity that it would come down on from its place.
+fn first_below(entities: &[Entity], upper: usize, up_W: &Vector3<f64>) -> Option<usize> {
+    let (entity, around) = (&entities[upper], Aabb::of_entity(&entities[upper])?);
+    let falls_m = |other: usize| {
+        let b = &entities[other];
+        let meets = other != upper && b.is_collidable && b.space == entity.space;
+        if !meets || !(is_collidable(&entity.shape, &b.shape) || is_collidable(&b.shape, &entity.shape)) {
+            return None;
+        }
+        match &b.shape {
+            Shape::Form(Form::Plane(plane)) => falls_on_plane(&around, b, plane, up_W),
+            _ => falls_on_box(&around, &Aabb::of_entity(b)?, up_W),
+        }
+    };
+    let all = (0..entities.len()).filter_map(|other| Some((falls_m(other)?, other)));
+    all.min_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, other)| other)
+}
+
+/// Way of a box until it is on a half-space (m); `None`: it never is.
+fn falls_on_plane(around: &Aabb, entity: &Entity, plane: &Plane, up_W: &Vector3<f64>) -> Option<f64> {
+    let normal_W = entity.X_WB.rotation * plane.normal_B();
+    let half_m = (around.high_W - around.low_W).abs() * 0.5;
+    let from_W = around.middle_W() - entity.X_WB.translation.vector;
+    let above_m = normal_W.dot(&from_W) - plane.offset_m() - normal_W.abs().dot(&half_m);
+    let down = normal_W.dot(up_W);
+    (down > BESIDE).then_some((above_m / down).max(0.0))
+}
+
+/// Way of a box until it is on another one (m); `None`: it never is.
+fn falls_on_box(around: &Aabb, other: &Aabb, up_W: &Vector3<f64>) -> Option<f64> {
+    let (mut first_m, mut last_m) = (0.0_f64, f64::INFINITY);
+    for axis in 0..3 {
+        let [near_m, far_m] =
+            [other.low_W[axis] - around.high_W[axis], other.high_W[axis] - around.low_W[axis]];
+        let down = -up_W[axis];
+        if down.abs() < 1e-9 {
+            // Side by side is not above each other.
+            if near_m > -AT_ONCE_M || far_m < AT_ONCE_M {
+                return None;
+            }
+            continue;
+        }
+        let ends_m = [near_m / down, far_m / down];
+        first_m = first_m.max(ends_m[0].min(ends_m[1]));
+        last_m = last_m.min(ends_m[0].max(ends_m[1]));
+    }
+    // What it is in already it does not fall on.
+    (first_m <= last_m && last_m > 0.0).then_some(first_m)
+}
+
+/// Things that are farther by less are reached at once \[m\].
+const AT_ONCE_M: f64 = 1e-5;
+/// Cosine between a normal and what is up where nothing is carried.
+const BESIDE: f64 = 0.2;
