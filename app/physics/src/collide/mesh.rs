@@ -6,8 +6,8 @@
 //! the mesh or point to it as is handy; [`Told`] turns it into contact points of A and B.
 //!
 //! Identity: what a contact point is about is told by a number below 2^27, a kind of two bits and three of the place among several: a face, an edge (three
-//! times its face plus its number there; where edges cross, four times that, whose it is and from which end), a vertex, or a
-//! point of the other one. No two of a pair clash as long as a mesh has less than 11,000,000 faces.
+//! times its face plus its number there; where edges cross, eight times that, whose it is and which of its places), a vertex, or a
+//! point of the other one. No two of a pair clash as long as a mesh has less than 5,500,000 faces.
 
 use haptics::mesh::{Mesh, Sides};
 use haptics::{Form, Shape};
@@ -169,8 +169,8 @@ pub(super) enum About {
     Vertex(u32),
     /// A point of the other one.
     Other(u32),
-    /// An edge of the mesh, or of the other one, that is cut off; seen from which end.
-    Cut { edge: u32, of_mesh: bool, end: u32 },
+    /// An edge of the mesh, or of the other one, that is cut off; which of its places that is.
+    Cut { edge: u32, of_mesh: bool, place: u32 },
 }
 
 impl About {
@@ -181,13 +181,13 @@ impl About {
             Self::Vertex(vertex) => vertex << 2 | 2,
             Self::Other(point) => point << 2 | 3,
             // No ball has any.
-            Self::Cut { edge, of_mesh, end } => (edge << 2 | u32::from(of_mesh) << 1 | end) << 2 | 1,
+            Self::Cut { edge, of_mesh, place } => (edge << 3 | u32::from(of_mesh) << 2 | place) << 2 | 1,
         }
     }
 
-    pub(super) fn at_end(self, at: u32) -> Self {
+    pub(super) fn at_place(self, place: u32) -> Self {
         match self {
-            Self::Cut { edge, of_mesh, .. } => Self::Cut { edge, of_mesh, end: at },
+            Self::Cut { edge, of_mesh, .. } => Self::Cut { edge, of_mesh, place },
             other => other,
         }
     }

@@ -4,9 +4,9 @@
 //! cross that of the table; without these it would fall off while its middle is still over the table.
 //! Model: the edge enters the mesh through its side; from there the way along the contact's normal leads out through the
 //! face that is pressed. Its normal is the contact's, the length of the way the depth. Or it dips through a ridge, in by one
-//! pressed face and out by another, as through the back of a round bar: then the way out is across both edges, from where
-//! it is as far behind the one face as behind the other.
-//! Cost: four queries for an edge that meets nothing, one to four more for each end where it does.
+//! face and out by another, as through the back of a round bar: then the way out is across both edges, from where it leads
+//! out of both faces at once. An end that is inside counts as if it had come in by the face that is over it.
+//! Cost: six queries for an edge that meets nothing, one to five more for each end where it does.
 
 use haptics::mesh::{Face, Hit, Mesh};
 use nalgebra::Vector3;
@@ -42,62 +42,105 @@ pub(super) struct Cut {
 }
 
 impl Edge {
-    /// Seen from either end. Where it is not cut off yet, but will dip through a ridge when it has come nearer: there.
-    pub(super) fn cuts(&self, mesh: &Mesh, way: &WayOut<'_>) -> [Option<Cut>; 2] {
+    /// Seen from either end, and where it dips through a ridge. Where it is not cut off yet, but will dip through one when
+    /// it has come nearer: there.
+    pub(super) fn cuts(&self, mesh: &Mesh, way: &WayOut<'_>) -> [Option<Cut>; MOST_CUTS] {
         let [a, b] = self.ends;
         let ways = [(&a, &b), (&b, &a)];
         let hits = ways.map(|(from, to)| mesh.first_hit(from, to));
-        if let [None, None] = hits {
+        let insides = [0, 1].map(|at| inside(mesh, hits[at].as_ref(), ways[at], way));
+        let dip = dips(mesh, &insides, way).or_else(|| dips(mesh, &entered_twice(mesh, &hits, way), way));
+        if let ([None, None], None) = (&hits, dip) {
             let will_dip = if way.ahead_m > 0.0 { self.will_dip(mesh, way) } else { None };
-            return [will_dip, None];
+            return [None, None, will_dip];
         }
-        if let Some(hits) = pressed_twice(mesh, &hits, way) {
-            return [self.dips(mesh, hits, way), None];
-        }
-        [0, 1].map(|at| cut(mesh, hits[at].as_ref()?, ways[at].1, way))
+        let cuts = [0, 1].map(|at| {
+            // Not by a side of the ridge, and the way out is the shorter one.
+            let Some(dip) = dip else { return cut(mesh, hits[at].as_ref()?, ways[at].1, way, ASIDE) };
+            let cut = cut(mesh, hits[at].as_ref()?, ways[at].1, way, LOOKS)?;
+            (cut.gap_m > dip.gap_m).then_some(cut)
+        });
+        [cuts[0], cuts[1], dip]
     }
 
     /// As if it were so much nearer.
     fn will_dip(&self, mesh: &Mesh, way: &WayOut<'_>) -> Option<Cut> {
         let nearer_M = way.along * -way.ahead_m;
         let [a, b] = self.ends.map(|end| end + nearer_M);
-        let hits = [mesh.first_hit(&a, &b)?, mesh.first_hit(&b, &a)?].map(Some);
+        let hits = [(&a, &b), (&b, &a)].map(|(from, to)| mesh.first_hit(from, to));
         let way = WayOut { most_m: way.most_m.max(2.0 * way.ahead_m), ..*way };
-        let cut = Self { ends: [a, b] }.dips(mesh, pressed_twice(mesh, &hits, &way)?, &way)?;
+        let cut = dips(mesh, &entered_twice(mesh, &hits, &way), &way)?;
         let (on_edge, gap_m) = (cut.on_edge - nearer_M, cut.gap_m - cut.out.dot(&nearer_M));
         (gap_m > 0.0).then_some(Cut { on_edge, on_mesh: on_edge - cut.out * gap_m, gap_m, ..cut })
     }
+}
 
-    /// The place at which it dips deepest through a ridge.
-    fn dips(&self, mesh: &Mesh, hits: [&Hit; 2], way: &WayOut<'_>) -> Option<Cut> {
-        let faces = hits.map(|hit| &mesh.faces()[hit.face as usize]);
-        let [from, to] = hits.map(|hit| hit.point_B);
-        let along_edge = (to - from).try_normalize(0.0)?;
-        let ridge = faces[0].normal_B.cross(&faces[1].normal_B);
-        let out = along_edge.cross(&ridge).try_normalize(FLAT)?;
-        let out = if out.dot(&way.along) < 0.0 { -out } else { out };
-        if out.dot(&way.along) < AGREES {
-            return None;
-        }
-        // As deep behind the one as behind the other: both grow from their ends.
-        let falls = faces.map(|face| face.normal_B.dot(&along_edge).abs());
-        let on_edge = from + (to - from) * (falls[1] / (falls[0] + falls[1]));
-        let left = mesh.first_hit(&(on_edge + out * way.most_m), &on_edge)?;
-        let gap_m = -(left.point_B - on_edge).norm();
-        Some(Cut { on_edge, on_mesh: left.point_B, out, gap_m })
+/// A point of an edge in a mesh, and the face that is between it and the way out.
+struct Inside<'m> {
+    at: Vector3<f64>,
+    face: &'m Face,
+}
+
+/// Where an edge comes in, seen from one end; or that end, if it is inside already.
+fn inside<'m>(
+    mesh: &'m Mesh,
+    hit: Option<&Hit>,
+    (from, to): (&Vector3<f64>, &Vector3<f64>),
+    way: &WayOut<'_>,
+) -> Option<Inside<'m>> {
+    if let Some(entered) = hit.and_then(|hit| entered(mesh, hit, way, LOOKS)) {
+        return Some(entered);
     }
+    let at = match hit {
+        Some(hit) => hit.point_B + (to - hit.point_B).try_normalize(0.0)? * (INSIDE * mesh.extent_m()),
+        None => *from,
+    };
+    let face = pressed(mesh, &at, way, LOOKS)?;
+    Some(Inside { at, face })
 }
 
-/// Both hits, if the edge goes in through pressed faces from either end.
-fn pressed_twice<'h>(mesh: &Mesh, hits: &'h [Option<Hit>; 2], way: &WayOut<'_>) -> Option<[&'h Hit; 2]> {
-    let [Some(first), Some(last)] = hits else { return None };
-    let is_pressed = |hit: &Hit| mesh.faces()[hit.face as usize].normal_B.dot(&way.along) > ASIDE;
-    (is_pressed(first) && is_pressed(last)).then_some([first, last])
+/// Where it comes in, if that is through a face that looks along the way out by so much.
+fn entered<'m>(mesh: &'m Mesh, hit: &Hit, way: &WayOut<'_>, looks: f64) -> Option<Inside<'m>> {
+    let face = &mesh.faces()[hit.face as usize];
+    (face.normal_B.dot(&way.along) > looks).then_some(Inside { at: hit.point_B, face })
 }
 
-fn cut(mesh: &Mesh, hit: &Hit, to: &Vector3<f64>, way: &WayOut<'_>) -> Option<Cut> {
+/// Where it comes in at either end, however the faces look there.
+fn entered_twice<'m>(mesh: &'m Mesh, hits: &[Option<Hit>; 2], way: &WayOut<'_>) -> [Option<Inside<'m>>; 2] {
+    [0, 1].map(|at| entered(mesh, hits[at].as_ref()?, way, LOOKS_AWAY))
+}
+
+/// The place between two points of an edge at which it is deepest in the ridge of the faces over them.
+fn dips(mesh: &Mesh, insides: &[Option<Inside<'_>>; 2], way: &WayOut<'_>) -> Option<Cut> {
+    let [Some(first), Some(last)] = insides else { return None };
+    let along_edge = (last.at - first.at).try_normalize(0.0)?;
+    let normals = [first, last].map(|inside| inside.face.normal_B);
+    let [sinks, rises] = normals.map(|normal| normal.dot(&along_edge));
+    // Out of a valley it would be deepest at its ends.
+    if sinks >= 0.0 || rises <= 0.0 {
+        return None;
+    }
+    let out = along_edge.cross(&normals[0].cross(&normals[1])).try_normalize(FLAT)?;
+    let out = if out.dot(&way.along) < 0.0 { -out } else { out };
+    let leans = normals.map(|normal| normal.dot(&out));
+    if out.dot(&way.along) < ACROSS || leans[0] <= 0.0 || leans[1] <= 0.0 {
+        return None;
+    }
+    // Out of both at once: ways out grow from either end.
+    let ways_m = [first, last].map(|inside| inside.face.offset_m - inside.face.normal_B.dot(&first.at));
+    let [from_m, to_m] = [0, 1].map(|at| ways_m[at] / leans[at]);
+    let far_m = (to_m - from_m) / (rises / leans[1] - sinks / leans[0]);
+    if !(0.0..=(last.at - first.at).norm()).contains(&far_m) {
+        return None;
+    }
+    let on_edge = first.at + along_edge * far_m;
+    let left = mesh.first_hit(&(on_edge + out * way.most_m), &on_edge)?;
+    Some(Cut { on_edge, on_mesh: left.point_B, out, gap_m: -(left.point_B - on_edge).norm() })
+}
+
+fn cut(mesh: &Mesh, hit: &Hit, to: &Vector3<f64>, way: &WayOut<'_>, side: f64) -> Option<Cut> {
     // Through the pressed face itself it goes without depth, through its back not at all.
-    if mesh.faces()[hit.face as usize].normal_B.dot(&way.along).abs() > ASIDE {
+    if mesh.faces()[hit.face as usize].normal_B.dot(&way.along).abs() > side {
         return None;
     }
     let along_edge = (to - hit.point_B).try_normalize(0.0)?;
@@ -107,23 +150,96 @@ fn cut(mesh: &Mesh, hit: &Hit, to: &Vector3<f64>, way: &WayOut<'_>) -> Option<Cu
     let lift = (way.lift)(&on_edge);
     let from = [on_edge, farther, on_edge + lift, farther + lift];
     let tried = if lift == Vector3::zeros() { 2 } else { 4 };
-    let face = from[..tried].iter().find_map(|point| pressed(mesh, point, way))?;
+    let face = from[..tried].iter().find_map(|point| pressed(mesh, point, way, AGREES))?;
     let gap_m = face.normal_B.dot(&on_edge) - face.offset_m;
     let on_mesh = on_edge - face.normal_B * gap_m;
     (gap_m < 0.0).then_some(Cut { on_edge, on_mesh, out: face.normal_B, gap_m })
 }
 
 /// The face through which the way out leads.
-fn pressed<'m>(mesh: &'m Mesh, point: &Vector3<f64>, way: &WayOut<'_>) -> Option<&'m Face> {
+fn pressed<'m>(mesh: &'m Mesh, point: &Vector3<f64>, way: &WayOut<'_>, agrees: f64) -> Option<&'m Face> {
     let out = mesh.first_hit(&(point + way.along * way.most_m), point)?;
     let face = &mesh.faces()[out.face as usize];
-    (face.normal_B.dot(&way.along) > AGREES).then_some(face)
+    (face.normal_B.dot(&way.along) > agrees).then_some(face)
 }
 
+/// From both ends, and through a ridge.
+pub(super) const MOST_CUTS: usize = 3;
 /// Sine between two directions that are one.
 const FLAT: f64 = 1e-6;
 /// Cosine between the pressed face and a side.
 const ASIDE: f64 = 0.7;
 const AGREES: f64 = 0.7;
+/// Cosine between the way out and a face of a ridge, of one that is found by it, and of a sharp one that it leans on.
+const LOOKS: f64 = 0.1;
+const LOOKS_AWAY: f64 = -0.7;
+/// Cosine between the way out and that across two edges.
+const ACROSS: f64 = 0.4;
 /// So far inside a side, in extents, a point is surely inside.
 const INSIDE: f64 = 1e-7;
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use haptics::mesh::TriangleSoup;
+
+    /// A block between x = +-1 and z = +-1 whose top is 0 at the sides and as high as this in the middle, along z.
+    fn roof(middle: f64) -> Mesh {
+        let outline = [[-1.0, 0.0], [-1.0, -2.0], [1.0, -2.0], [1.0, 0.0], [0.0, middle]];
+        let end = |z: f64| outline.map(|[x, y]| Vector3::new(x, y, z));
+        let vertices = [end(1.0), end(-1.0)].concat();
+        let fan =
+            if middle > 0.0 { [[0, 1, 2], [0, 2, 3], [0, 3, 4]] } else { [[4, 0, 1], [4, 1, 2], [4, 2, 3]] };
+        let mut faces = fan.to_vec();
+        faces.extend(fan.map(|[a, b, c]| [a + 5, c + 5, b + 5]));
+        faces.extend((0..5).flat_map(|a| {
+            let b = (a + 1) % 5;
+            [[a, a + 5, b + 5], [a, b + 5, b]]
+        }));
+        Mesh::build(TriangleSoup { vertices, faces }).unwrap().0
+    }
+
+    fn cuts(middle: f64, along: Vector3<f64>, ends: [[f64; 3]; 2]) -> Vec<Cut> {
+        let way = WayOut { along, most_m: 1.0, ahead_m: 0.0, lift: &|_| Vector3::zeros() };
+        let edge = Edge { ends: ends.map(Vector3::from) };
+        edge.cuts(&roof(middle), &way).into_iter().flatten().collect()
+    }
+
+    #[test]
+    fn an_edge_through_a_ridge_is_let_out_across_it_and_not_by_a_side() {
+        let leaning = Vector3::new(1.0, 1.0, 0.0).normalize();
+        // From far outside, and from inside; its ends may be as far from the ridge as they like.
+        for (along, from, to) in [
+            (Vector3::y(), -5.0, 5.0),
+            (Vector3::y(), -0.05, 0.05),
+            (Vector3::y(), -0.08, 5.0),
+            (Vector3::y(), -3.0, 0.02),
+            (leaning, -5.0, 5.0),
+            (leaning, -0.2, 0.3),
+        ] {
+            let cuts = cuts(1.0, along, [[from, 0.9, 0.3], [to, 0.9, 0.3]]);
+            let [cut] = cuts[..] else { panic!("{along} {from} {to}: {cuts:?}") };
+            assert!((cut.gap_m + 0.1).abs() < 1e-12, "{along} {from} {to}: {cut:?}");
+            assert!((cut.out - Vector3::y()).norm() < 1e-12, "{cut:?}");
+            assert!((cut.on_mesh - Vector3::new(0.0, 1.0, 0.3)).norm() < 1e-12, "{cut:?}");
+        }
+    }
+
+    /// It leans by a quarter along z and a half across: what is across both is `(0, 1, 0)` without what leans across.
+    #[test]
+    fn a_leaning_edge_is_as_deep_as_the_way_across_both_is_long() {
+        let way = Vector3::new(1.0, 0.5, 0.25);
+        let middle = Vector3::new(0.0, 0.8, 0.1);
+        let ends = [middle - way * 4.0, middle + way * 4.0].map(|end| [end.x, end.y, end.z]);
+        let [cut] = cuts(1.0, Vector3::y(), ends)[..] else { panic!() };
+        let out = Vector3::new(-0.5, 1.0, 0.0).normalize();
+        assert!((cut.out - out).norm() < 1e-12, "{cut:?}");
+        // From the ridge's foot to any of the edge's.
+        assert!((cut.gap_m + out.dot(&(Vector3::new(0.0, 1.0, 0.1) - middle))).abs() < 1e-12, "{cut:?}");
+    }
+
+    #[test]
+    fn an_edge_over_a_valley_dips_through_nothing() {
+        assert!(cuts(-0.5, Vector3::y(), [[-0.8, -0.55, 0.0], [0.8, -0.55, 0.0]]).is_empty());
+    }
+}

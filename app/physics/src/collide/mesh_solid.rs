@@ -264,11 +264,6 @@ impl Place<'_> {
         self.patches.lift_M(self.number, point_M, sign, self.meeting.travel_m)
     }
 
-    /// Single places' edges are stopped before they are in each other \[m\].
-    fn ahead_m(&self) -> f64 {
-        if self.patches.is_alone(self.number) { self.meeting.reach_m } else { 0.0 }
-    }
-
     /// The other one's points against the mesh.
     fn owns(&mut self, stands: &mut super::Stands) {
         let (mesh, other, meeting) = (self.mesh, self.other, self.meeting);
@@ -307,7 +302,7 @@ impl Place<'_> {
     fn edges(&mut self) {
         let n = self.meeting.normal_M;
         for (number, edge) in self.other.edges(&-n).into_iter().flatten().enumerate() {
-            self.cuts_by_mesh(&edge, About::Cut { edge: number as u32, of_mesh: false, end: 0 });
+            self.cuts_by_mesh(&edge, About::Cut { edge: number as u32, of_mesh: false, place: 0 });
         }
     }
 
@@ -318,19 +313,23 @@ impl Place<'_> {
         let place = |point: &Vector3<f64>| (X_MO * Point3::from(*point)).coords;
         let from = place(corner.point_M(second));
         corner.for_each_edge(second, |to, face, edge| {
-            let about = About::Cut { edge: 3 * face + edge as u32, of_mesh: false, end: 0 };
+            let about = About::Cut { edge: 3 * face + edge as u32, of_mesh: false, place: 0 };
             self.cuts_by_mesh(&Edge { ends: [from, place(to)] }, about);
         });
     }
 
     fn cuts_by_mesh(&mut self, edge: &Edge, about: About) {
         let lift = |point_M: &Vector3<f64>| self.lift_M(point_M, 1.0);
-        let ahead_m = self.ahead_m();
-        let way = WayOut { along: self.meeting.normal_M, most_m: self.way_m(), ahead_m, lift: &lift };
+        let way = WayOut {
+            along: self.meeting.normal_M,
+            most_m: self.way_m(),
+            ahead_m: self.meeting.reach_m,
+            lift: &lift,
+        };
         let cuts = edge.cuts(self.mesh, &way);
-        for (end, cut) in cuts.into_iter().enumerate() {
+        for (at, cut) in cuts.into_iter().enumerate() {
             if let Some(cut) = cut {
-                let about = about.at_end(end as u32);
+                let about = about.at_place(at as u32);
                 self.push(Contact::new(about, cut.on_mesh, cut.out, cut.gap_m));
             }
         }
@@ -347,12 +346,12 @@ impl Place<'_> {
             let point_M = (X_MO * Point3::from(*point)).coords;
             turned(&patches.lift_M(number, &point_M, -1.0, meeting.travel_m))
         };
-        let way = WayOut { along: turned(&-meeting.normal_M), most_m, ahead_m: self.ahead_m(), lift: &lift };
+        let way = WayOut { along: turned(&-meeting.normal_M), most_m, ahead_m: meeting.reach_m, lift: &lift };
         let from = place(corner.point_M(mesh));
         corner.for_each_edge(mesh, |to, face, edge| {
             let cuts = Edge { ends: [from, place(to)] }.cuts(second, &way);
-            for (end, cut) in cuts.into_iter().enumerate() {
-                let about = About::Cut { edge: 3 * face + edge as u32, of_mesh: true, end: end as u32 };
+            for (at, cut) in cuts.into_iter().enumerate() {
+                let about = About::Cut { edge: 3 * face + edge as u32, of_mesh: true, place: at as u32 };
                 if let Some(cut) = cut {
                     let on_mesh_M = (X_MO * Point3::from(cut.on_edge)).coords;
                     self.push(Contact::new(about, on_mesh_M, -(X_MO * cut.out), cut.gap_m));
