@@ -43,6 +43,8 @@ pub(crate) struct Searched {
     pub(super) X_MO: Isometry3<f64>,
     /// All places whose gap was no larger are known \[m\].
     pub(super) within_m: f64,
+    /// There may be more, all around.
+    pub(super) is_crowded: bool,
 }
 
 impl Patch {

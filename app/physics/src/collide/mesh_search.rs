@@ -31,7 +31,7 @@ pub(super) fn look_around(
         return;
     }
     let within_m = reach_m + MARGIN_M + 4.0 * travel_m;
-    patches.searched = Some(Searched { X_MO: other.X_MO, within_m });
+    patches.searched = Some(Searched { X_MO: other.X_MO, within_m, is_crowded: false });
     let mut places = Places::new(within_m, patches);
     let (_, radius_m) = other.ball();
     let is_convex = other.is_convex();
@@ -53,7 +53,8 @@ pub(super) fn look_around(
     );
     if places.is_crowded || !is_complete {
         let margin_m = if places.is_crowded { CROWDED_M } else { 0.5 * MARGIN_M };
-        patches.searched = Some(Searched { X_MO: other.X_MO, within_m: reach_m + margin_m });
+        patches.searched =
+            Some(Searched { X_MO: other.X_MO, within_m: reach_m + margin_m, is_crowded: true });
     }
     places.settle(patches, is_convex);
 }

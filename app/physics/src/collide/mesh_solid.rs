@@ -212,7 +212,9 @@ impl Place<'_> {
     /// What lies so far behind a place is another side of the same; the first one takes what is nobody else's \[m\].
     fn behind_m(&self) -> f64 {
         let (_, radius_m) = self.other.ball();
-        if self.number == 0 { BEHIND_M.max(0.5 * radius_m) } else { BEHIND_M }
+        // In a bore, what lies far behind is its other side.
+        let is_around = self.patches.searched.is_some_and(|searched| searched.is_crowded);
+        if self.number == 0 && !is_around { BEHIND_M.max(0.5 * radius_m) } else { BEHIND_M }
     }
 
     /// An edge that is cut off by the outline of a single place leaves a vertex so far beside it \[m\].

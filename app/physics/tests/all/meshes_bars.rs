@@ -273,3 +273,59 @@ fn a_plank_lies_across_a_wall_with_sloping_sides_until_its_middle_is_past_the_to
         assert!(((at_m - 0.005).abs() < 3e-5) == lies, "{aside_m} m: {at_m} m");
     }
 }
+
+/// A ring along z with so many sides, 10 mm wide within and 20 mm without, as long as it is wide.
+fn ring(sides: u32) -> Shape {
+    let rings = [(2.0, 1.0), (2.0, -1.0), (1.0, -1.0), (1.0, 1.0)];
+    let corner = |at: u32, (wide, end): (f64, f64)| {
+        let (sin, cos) = (TAU * f64::from(at) / f64::from(sides)).sin_cos();
+        Vector3::new(wide * RADIUS_M * cos, wide * RADIUS_M * sin, end * RADIUS_M)
+    };
+    let vertices = rings.into_iter().flat_map(|ring| (0..sides).map(move |at| corner(at, ring))).collect();
+    let mut faces = vec![];
+    for (ring, at) in (0..4).flat_map(|ring| (0..sides).map(move |at| (ring, at))) {
+        let [next, beyond] = [(at + 1) % sides, (ring + 1) % 4];
+        let [a, b, c, d] =
+            [[ring, at], [beyond, at], [beyond, next], [ring, next]].map(|[ring, at]| ring * sides + at);
+        faces.extend([[a, b, c], [a, c, d]]);
+    }
+    meshes::build(haptics::mesh::TriangleSoup { vertices, faces }).into()
+}
+
+/// The axle is in the ring's hole as long as its corners are on the inner side of all of its faces.
+#[test]
+fn a_ring_that_spins_comes_to_hang_on_an_axle_however_close_it_fits() {
+    for (sides, wide, turned) in [8, 12, 24, 48]
+        .into_iter()
+        .flat_map(|sides| [(0.8, 0.0), (0.95, 0.1)].map(|(wide, by)| (sides, wide, by)))
+    {
+        let axle_corner = |at: u32| {
+            let (sin, cos) = (TAU * f64::from(at) / f64::from(sides) + turned).sin_cos();
+            [wide * RADIUS_M * cos, wide * RADIUS_M * sin]
+        };
+        let outline: Vec<_> = (0..sides).map(axle_corner).collect();
+        let fan: Vec<_> = (2..sides).map(|at| [0, at - 1, at]).collect();
+        let axle: Shape = meshes::build(meshes::prism(&outline, &fan, LENGTH_M)).into();
+        let entities =
+            [axle, ring(sides)].map(|shape| object(shape, Isometry3::identity(), 1000.0, 0.3)).to_vec();
+        let bodies = [(1, body(&entities[1], 0.05).moving(Vector3::zeros(), Vector3::z() * 5.0))];
+        let contact_stiffness = ContactStiffness::ByMass { damping_ratio: 1.0 };
+        let mut world =
+            World::new(entities, &bodies, Settings { contact_stiffness, ..Settings::default() }, 0);
+        for _ in 0..1500 {
+            world.step(&[]);
+        }
+        let X_WR = world.entities[1].X_WB;
+        let apothem_m = RADIUS_M * (PI / f64::from(sides)).cos();
+        let mut deepest_m = f64::NEG_INFINITY;
+        for (corner, z) in outline.iter().flat_map(|corner| [-RADIUS_M, 0.0, RADIUS_M].map(|z| (corner, z))) {
+            let at = X_WR.inverse_transform_point(&nalgebra::Point3::new(corner[0], corner[1], z));
+            for side in 0..sides {
+                let (sin, cos) = (TAU * (f64::from(side) + 0.5) / f64::from(sides)).sin_cos();
+                deepest_m = deepest_m.max(at.x * cos + at.y * sin - apothem_m);
+            }
+        }
+        // Of many sides it is round about: a hole's edges are hollow, and not all of an axle's are seen.
+        assert!((-2e-5..5e-4).contains(&deepest_m), "{sides} sides, {wide} wide: {deepest_m:e} m");
+    }
+}
