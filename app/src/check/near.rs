@@ -27,7 +27,7 @@ impl Pair {
 pub(super) fn pairs(rig: &Rig, entities: &[Entity]) -> Vec<Pair> {
     let mut pairs = Vec::new();
     near_pairs(rig, entities, |a, b| {
-        let (gap_m, normal_W) = nearest(&entities[a], &entities[b]);
+        let (gap_m, normal_W) = nearest(&entities[a], &entities[b], TOUCH_M);
         pairs.push(Pair { one: a, other: b, gap_m, normal_W });
     });
     pairs
@@ -63,8 +63,9 @@ fn near_pairs(rig: &Rig, entities: &[Entity], mut meet: impl FnMut(usize, usize)
     }
 }
 
-/// Distance of the two where they are nearest to each other (m), and the normal to the first one there.
-fn nearest(a: &Entity, b: &Entity) -> (f64, Vector3<f64>) {
+/// Distance of the two where they are nearest to each other (m), and the normal to the first one there; infinite where that is
+/// more than they reach (m).
+pub(super) fn nearest(a: &Entity, b: &Entity, reach_m: f64) -> (f64, Vector3<f64>) {
     let far = (f64::INFINITY, Vector3::zeros());
     let is_turned = !is_collidable(&a.shape, &b.shape);
     let (a, b) = if is_turned { (b, a) } else { (a, b) };
@@ -76,10 +77,10 @@ fn nearest(a: &Entity, b: &Entity) -> (f64, Vector3<f64>) {
         let entity: &Entity = entity;
         Solid { shape: &entity.shape, X_W: &entity.X_WB }
     };
-    contact_points(solid(a), solid(b), TOUCH_M, &mut memory, &mut points);
+    contact_points(solid(a), solid(b), reach_m, &mut memory, &mut points);
     let nearest = points.as_slice().iter().min_by(|a, b| a.gap_m.total_cmp(&b.gap_m));
     nearest.map_or(far, |point| (point.gap_m, if is_turned { -point.normal_W } else { point.normal_W }))
 }
 
 /// Things that are nearer stand on each other \[m\].
-const TOUCH_M: f64 = 1e-3;
+pub(super) const TOUCH_M: f64 = 1e-3;

@@ -1,12 +1,13 @@
 //! Loads: all that stands on something else, or will come down on it.
 //!
 //! Model: a thing is pressed into what it touches below it by its own weight and by what stands on it, in equal shares; what
-//! touches nothing will come down on what is the first below it.
-//! Limits: what is below is told by boxes along the axes of the world: of a ring, its hole too.
+//! touches nothing will come down on what is the first below it: of all whose boxes it would meet, it is let down by steps on
+//! the shape itself, so it falls through a ring's hole and past a wall that it touches.
+//! Limits: it falls as it is turned, and straight down; what is thinner than a step (a hundredth of the way past it) may be missed.
 
 #![allow(non_snake_case)] // Frames are capital letters.
 
-use super::near::Pair;
+use super::near::{Pair, TOUCH_M, nearest};
 use haptics::{Entity, Form, Plane, Shape};
 use nalgebra::Vector3;
 use physics::Aabb;
@@ -73,12 +74,39 @@ fn first_below(entities: &[Entity], upper: usize, up_W: &Vector3<f64>) -> Option
             return None;
         }
         match &b.shape {
-            Shape::Form(Form::Plane(plane)) => falls_on_plane(&around, b, plane, up_W),
+            Shape::Form(Form::Plane(plane)) => {
+                falls_on_plane(&around, b, plane, up_W).map(|way_m| [way_m; 2])
+            }
             _ => falls_on_box(&around, &Aabb::of_entity(b)?, up_W),
         }
     };
-    let all = (0..entities.len()).filter_map(|other| Some((falls_m(other)?, other)));
-    all.min_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, other)| other)
+    let mut all: Vec<_> = (0..entities.len()).filter_map(|other| Some((falls_m(other)?, other))).collect();
+    all.sort_by(|a, b| a.0[0].total_cmp(&b.0[0]));
+    let mut first: Option<(f64, usize)> = None;
+    for (ways_m, other) in all {
+        if first.is_some_and(|(way_m, _)| way_m <= ways_m[0]) {
+            break;
+        }
+        let lands_m = match &entities[other].shape {
+            Shape::Form(Form::Plane(_)) => Some(ways_m[0]),
+            _ => lands_m(entity, &entities[other], ways_m, up_W),
+        };
+        if let Some(way_m) = lands_m.filter(|way_m| first.is_none_or(|(first_m, _)| *way_m < first_m)) {
+            first = Some((way_m, other));
+        }
+    }
+    first.map(|(_, other)| other)
+}
+
+/// Way straight down until one lies on the other one, if that is between these two (m).
+fn lands_m(entity: &Entity, other: &Entity, [first_m, last_m]: [f64; 2], up_W: &Vector3<f64>) -> Option<f64> {
+    let step_m = (last_m - first_m) / STEPS as f64;
+    (0..=STEPS).map(|step| first_m + step as f64 * step_m).find_map(|way_m| {
+        let mut lowered = entity.clone();
+        lowered.X_WB.translation.vector -= up_W * way_m;
+        let (gap_m, normal_W) = nearest(&lowered, other, step_m.max(TOUCH_M));
+        (gap_m.is_finite() && normal_W.dot(up_W) > BESIDE).then_some(way_m + gap_m.max(0.0))
+    })
 }
 
 /// Way of a box until it is on a half-space (m); `None`: it never is.
@@ -91,8 +119,8 @@ fn falls_on_plane(around: &Aabb, entity: &Entity, plane: &Plane, up_W: &Vector3<
     (down > BESIDE).then_some((above_m / down).max(0.0))
 }
 
-/// Way of a box until it is on another one (m); `None`: it never is.
-fn falls_on_box(around: &Aabb, other: &Aabb, up_W: &Vector3<f64>) -> Option<f64> {
+/// Ways of a box until it is on another one, and past it (m); `None`: it never is.
+fn falls_on_box(around: &Aabb, other: &Aabb, up_W: &Vector3<f64>) -> Option<[f64; 2]> {
     let (mut first_m, mut last_m) = (0.0_f64, f64::INFINITY);
     for axis in 0..3 {
         let [near_m, far_m] =
@@ -110,10 +138,12 @@ fn falls_on_box(around: &Aabb, other: &Aabb, up_W: &Vector3<f64>) -> Option<f64>
         last_m = last_m.min(ends_m[0].max(ends_m[1]));
     }
     // What it is in already it does not fall on.
-    (first_m <= last_m && last_m > 0.0).then_some(first_m)
+    (first_m <= last_m && last_m > 0.0).then_some([first_m, last_m])
 }
 
 /// Things that are farther by less are reached at once \[m\].
 const AT_ONCE_M: f64 = 1e-5;
+/// By so many what falls is let down.
+const STEPS: usize = 100;
 /// Cosine between a normal and what is up where nothing is carried.
 const BESIDE: f64 = 0.2;

@@ -521,6 +521,23 @@ fn check_tells_what_falls_on_what_and_how_thin_it_is_whichever_way_it_is_turned(
     assert!(said.contains("plank sinks 19.62 mm into table"), "{said}");
     let said = told(&(table.clone() + &cube("lost", [2.0, 0.1, 0.0], [0.04; 3], "mass_kg = 0.1")));
     assert!(said.contains("nothing is below lost"), "{said}");
+    // Through a ring's hole, past a wall that it touches, and beside a rod that is turned; and on that rod.
+    let ring = "[[entity]]\nname = \"ring\"\nposition_m = [0, 0.1, 0]\nstiffness_n_per_m = 1000\n\
+                shape = { kind = \"torus\", ring_radius_m = 0.05, tube_radius_m = 0.01 }\n";
+    let wall = cube("wall", [0.1, 0.2, 0.0], [0.02, 0.2, 0.2], "");
+    let turned = "orientation_wxyz = [0.923879533, 0, 0.382683432, 0]";
+    let rod = cube("rod", [0.0, 0.1, 0.0], [0.4, 0.01, 0.01], turned);
+    for (between, at, lower) in [
+        (ring, [0.0, 0.3, 0.0], "table"),
+        (ring, [0.05, 0.3, 0.0], "ring"),
+        (&wall, [0.07, 0.2, 0.0], "table"),
+        (&rod, [0.1, 0.3, 0.1], "table"),
+        (&rod, [-0.1, 0.3, 0.1], "rod"),
+    ] {
+        let said = told(&(table.clone() + between + &cube("thing", at, [0.04; 3], "mass_kg = 1")));
+        let sinks = said.lines().find(|line| line.contains("thing sinks")).unwrap_or("");
+        assert!(sinks.contains(&format!("mm into {lower} ")), "{at:?} {said}");
+    }
     let rolls = "mass_kg = 0.1\nrolling_friction_m = 0.5";
     let said = told(&(table + &cube("roller", [0.0, 0.02, 0.0], [0.04; 3], rolls)));
     assert!(
