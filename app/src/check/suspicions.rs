@@ -17,6 +17,7 @@ pub(super) fn all(rig: &Rig, measures: &[Measures]) -> Vec<String> {
     found.extend(measures.iter().filter_map(nothing));
     found.extend(measures.iter().filter_map(mass));
     found.extend(measures.iter().flat_map(|it| turning(rig, it)));
+    found.extend(measures.iter().filter_map(|it| spread(rig, it)));
     found.extend(densities(&rig.scene));
     found.extend(far(rig, measures));
     found.extend(fingers(&rig.scene));
@@ -138,6 +139,42 @@ fn turning(rig: &Rig, it: &Measures) -> Vec<String> {
         )
     });
     told.collect()
+}
+
+/// A centre of mass that is not in the box around it, and moments that no mass in that box has.
+fn spread(rig: &Rig, it: &Measures) -> Option<String> {
+    spec_of(rig, &it.name).and_then(|entity| {
+        let (motion, size_m, mass_kg) = (entity.motion?, Vector3::from(it.size_m?), it.mass_kg?);
+        let middle_B = entity.pose.inverse_transform_point(&it.middle_m.into()).coords;
+        let centre_B = motion.centre_of_mass_m.map_or(middle_B, Vector3::from);
+        let from_middle_m = (centre_B - middle_B).abs();
+        let outside_m = (from_middle_m - size_m * 0.5).max();
+        if outside_m > 1e-6 * size_m.max() {
+            return Some(format!(
+                "{}: its centre of mass is {} m outside of it; centre_of_mass_m is in metres, in the frame of the entity",
+                it.name,
+                short(outside_m)
+            ));
+        }
+        // All of it in the corner that is farthest away.
+        let squares_m2 = (from_middle_m + size_m * 0.5).map(|part_m| part_m * part_m);
+        let axis = |axis: usize| {
+            let most = mass_kg * (squares_m2.sum() - squares_m2[axis]);
+            let moment = motion.inertia_kg_m2?[axis];
+            (moment > most).then(|| {
+                format!(
+                    "{}: inertia_kg_m2 about {} is {}, more than {}, which is all of its mass at its farthest corner; if \
+                     kg mm^2 were meant, write {}",
+                    it.name,
+                    ["x", "y", "z"][axis],
+                    short(moment),
+                    short(most),
+                    short(1e-6 * moment)
+                )
+            })
+        };
+        (0..3).find_map(axis)
+    })
 }
 
 /// Densities in grams per cubic centimetre.

@@ -538,6 +538,22 @@ fn check_tells_what_falls_on_what_and_how_thin_it_is_whichever_way_it_is_turned(
         let sinks = said.lines().find(|line| line.contains("thing sinks")).unwrap_or("");
         assert!(sinks.contains(&format!("mm into {lower} ")), "{at:?} {said}");
     }
+    // Of 1 kg, 40 mm wide, 0.0008 m^2 kg is all of it in a corner, seen from the middle; 0.0032 from another corner.
+    for (spread, line) in [
+        ("centre_of_mass_m = [0, 0.021, 0]", Some("thing: its centre of mass is 0.001 m outside of it")),
+        ("centre_of_mass_m = [0, 0.02, 0]", None),
+        (
+            "inertia_kg_m2 = [0.00081, 0.0008, 0.0008]",
+            Some("thing: inertia_kg_m2 about x is 0.00081, more than 0.0008"),
+        ),
+        ("inertia_kg_m2 = [0.00079, 0.00079, 0.00079]", None),
+        ("centre_of_mass_m = [0.02, 0.02, 0.02]\ninertia_kg_m2 = [0.0031, 0.0031, 0.0031]", None),
+    ] {
+        let of = format!("mass_kg = 1\n{spread}");
+        let said = told(&(table.clone() + &cube("thing", [0.0, 0.02, 0.0], [0.04; 3], &of)));
+        let is_told = said.contains("its centre of mass") || said.contains("inertia_kg_m2 about");
+        assert!(line.is_none_or(|line| said.contains(line)) && is_told == line.is_some(), "{spread}: {said}");
+    }
     let rolls = "mass_kg = 0.1\nrolling_friction_m = 0.5";
     let said = told(&(table + &cube("roller", [0.0, 0.02, 0.0], [0.04; 3], rolls)));
     assert!(
