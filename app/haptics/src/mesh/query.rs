@@ -18,6 +18,11 @@ impl Mesh {
         self.bvh.first_hit(self.triangles(), Sides::Solid, from_B, to_B)
     }
 
+    /// The first face that the segment goes through, from either side of it; as precise as [`Self::first_hit`].
+    pub fn first_crossing(&self, from_B: &Vector3<f64>, to_B: &Vector3<f64>) -> Option<Hit> {
+        self.bvh.first_hit(self.triangles(), Sides::Sheet, from_B, to_B)
+    }
+
     /// As [`Self::first_hit`], of the faces that `is_skipped` does not name.
     pub(crate) fn first_hit_of_others(
         &self,

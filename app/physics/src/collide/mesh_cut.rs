@@ -6,9 +6,9 @@
 //! face that is pressed. Its normal is the contact's, the length of the way the depth. Or it dips through a ridge, in by one
 //! face and out by another, as through the back of a round bar: then the way out is across both edges, from where it leads
 //! out of both faces at once. An end that is inside counts as if it had come in by the face that is over it.
-//! Cost: six queries for an edge that meets nothing, one to five more for each end where it does.
+//! Cost: six queries for an edge that meets nothing, two to seven more for each end where it does.
 
-use haptics::mesh::{Face, Hit, Mesh};
+use haptics::mesh::{Face, Hit, Mesh, Sides};
 use nalgebra::Vector3;
 
 /// An edge in the mesh's frame.
@@ -42,36 +42,92 @@ pub(super) struct Cut {
 }
 
 impl Edge {
-    /// Seen from either end, and where it dips through a ridge. Where it is not cut off yet, but will dip through one when
+    /// Seen from either end, and where it dips through ridges there. Where it is not cut off yet, but will dip through one when
     /// it has come nearer: there.
     pub(super) fn cuts(&self, mesh: &Mesh, way: &WayOut<'_>) -> [Option<Cut>; MOST_CUTS] {
         let [a, b] = self.ends;
         let ways = [(&a, &b), (&b, &a)];
         let hits = ways.map(|(from, to)| mesh.first_hit(from, to));
-        let insides = [0, 1].map(|at| inside(mesh, hits[at].as_ref(), ways[at], way));
-        let dip = dips(mesh, &insides, way).or_else(|| dips(mesh, &entered_twice(mesh, &hits, way), way));
-        if let ([None, None], None) = (&hits, dip) {
-            let will_dip = if way.ahead_m > 0.0 { self.will_dip(mesh, way) } else { None };
-            return [None, None, will_dip];
+        let parts = self.parts(mesh, &hits);
+        let dips = [0, 1].map(|at| parts[at].as_ref().and_then(|part| part.dips(mesh, way)));
+        if let ([None, None], [None, None]) = (&hits, dips) {
+            let will_dip = if way.ahead_m > 0.0 { self.will_dip(mesh, way) } else { [None; 2] };
+            return [None, None, will_dip[0], will_dip[1]];
         }
         let cuts = [0, 1].map(|at| {
             // Not by a side of the ridge, and the way out is the shorter one.
+            let dip = if parts[1].is_some() { dips[at] } else { dips[0] };
             let Some(dip) = dip else { return cut(mesh, hits[at].as_ref()?, ways[at].1, way, ASIDE) };
             let cut = cut(mesh, hits[at].as_ref()?, ways[at].1, way, LOOKS)?;
             (cut.gap_m > dip.gap_m).then_some(cut)
         });
-        [cuts[0], cuts[1], dip]
+        [cuts[0], cuts[1], dips[0], dips[1]]
     }
 
     /// As if it were so much nearer.
-    fn will_dip(&self, mesh: &Mesh, way: &WayOut<'_>) -> Option<Cut> {
+    fn will_dip(&self, mesh: &Mesh, way: &WayOut<'_>) -> [Option<Cut>; 2] {
         let nearer_M = way.along * -way.ahead_m;
-        let [a, b] = self.ends.map(|end| end + nearer_M);
+        let nearer = Self { ends: self.ends.map(|end| end + nearer_M) };
+        let [a, b] = nearer.ends;
         let hits = [(&a, &b), (&b, &a)].map(|(from, to)| mesh.first_hit(from, to));
+        if hits.iter().any(Option::is_none) {
+            return [None; 2];
+        }
         let way = WayOut { most_m: way.most_m.max(2.0 * way.ahead_m), ..*way };
-        let cut = dips(mesh, &entered_twice(mesh, &hits, &way), &way)?;
-        let (on_edge, gap_m) = (cut.on_edge - nearer_M, cut.gap_m - cut.out.dot(&nearer_M));
-        (gap_m > 0.0).then_some(Cut { on_edge, on_mesh: on_edge - cut.out * gap_m, gap_m, ..cut })
+        nearer.parts(mesh, &hits).map(|part| {
+            let cut = dips(mesh, &part?.entered(mesh, &way), &way)?;
+            let (on_edge, gap_m) = (cut.on_edge - nearer_M, cut.gap_m - cut.out.dot(&nearer_M));
+            (gap_m > 0.0).then_some(Cut { on_edge, on_mesh: on_edge - cut.out * gap_m, gap_m, ..cut })
+        })
+    }
+
+    /// What of it is in the mesh, or, where it goes in and out several times, the first and the last of that.
+    fn parts(&self, mesh: &Mesh, hits: &[Option<Hit>; 2]) -> [Option<Part>; 2] {
+        let whole = Some(Part { ends: self.ends, hits: *hits });
+        if mesh.sides() == Sides::Sheet || hits.iter().all(Option::is_none) {
+            return [whole, None];
+        }
+        let inside_m = INSIDE * mesh.extent_m();
+        // Where it comes in, seen from this end, if that is outside; and where it leaves again.
+        let passes = |at: usize| {
+            let [from, to] = [self.ends[at], self.ends[1 - at]];
+            let first = mesh.first_crossing(&from, &to)?;
+            if !first.is_front {
+                return Some((None, first));
+            }
+            let farther = first.point_B + (to - from).try_normalize(0.0)? * inside_m;
+            Some((Some(first), mesh.first_crossing(&farther, &to)?))
+        };
+        let [Some((entered, left)), Some((last_entered, last_left))] = [0, 1].map(passes) else {
+            return [whole, None];
+        };
+        if last_entered.is_some_and(|last| (last.point_B - left.point_B).norm() < 2.0 * inside_m) {
+            return [whole, None];
+        }
+        let part = |hits| Some(Part { ends: self.ends, hits });
+        [part([entered, Some(left)]), part([Some(last_left), last_entered])]
+    }
+}
+
+/// A part of an edge between where it comes in, seen from either end; or that end, if it is inside already.
+struct Part {
+    ends: [Vector3<f64>; 2],
+    hits: [Option<Hit>; 2],
+}
+
+impl Part {
+    fn dips(&self, mesh: &Mesh, way: &WayOut<'_>) -> Option<Cut> {
+        let [a, b] = &self.ends;
+        let insides = [
+            inside(mesh, self.hits[0].as_ref(), (a, b), way),
+            inside(mesh, self.hits[1].as_ref(), (b, a), way),
+        ];
+        dips(mesh, &insides, way).or_else(|| dips(mesh, &self.entered(mesh, way), way))
+    }
+
+    /// Where it comes in at either end, however the faces look there.
+    fn entered<'m>(&self, mesh: &'m Mesh, way: &WayOut<'_>) -> [Option<Inside<'m>>; 2] {
+        [0, 1].map(|at| entered(mesh, self.hits[at].as_ref()?, way, LOOKS_AWAY))
     }
 }
 
@@ -103,11 +159,6 @@ fn inside<'m>(
 fn entered<'m>(mesh: &'m Mesh, hit: &Hit, way: &WayOut<'_>, looks: f64) -> Option<Inside<'m>> {
     let face = &mesh.faces()[hit.face as usize];
     (face.normal_B.dot(&way.along) > looks).then_some(Inside { at: hit.point_B, face })
-}
-
-/// Where it comes in at either end, however the faces look there.
-fn entered_twice<'m>(mesh: &'m Mesh, hits: &[Option<Hit>; 2], way: &WayOut<'_>) -> [Option<Inside<'m>>; 2] {
-    [0, 1].map(|at| entered(mesh, hits[at].as_ref()?, way, LOOKS_AWAY))
 }
 
 /// The place between two points of an edge at which it is deepest in the ridge of the faces over them.
@@ -163,8 +214,8 @@ fn pressed<'m>(mesh: &'m Mesh, point: &Vector3<f64>, way: &WayOut<'_>, agrees: f
     (face.normal_B.dot(&way.along) > agrees).then_some(face)
 }
 
-/// From both ends, and through a ridge.
-pub(super) const MOST_CUTS: usize = 3;
+/// From both ends, and through a ridge at each.
+pub(super) const MOST_CUTS: usize = 4;
 /// Sine between two directions that are one.
 const FLAT: f64 = 1e-6;
 /// Cosine between the pressed face and a side.
@@ -236,6 +287,30 @@ mod tests {
         assert!((cut.out - out).norm() < 1e-12, "{cut:?}");
         // From the ridge's foot to any of the edge's.
         assert!((cut.gap_m + out.dot(&(Vector3::new(0.0, 1.0, 0.1) - middle))).abs() < 1e-12, "{cut:?}");
+    }
+
+    /// Of a saw of three roofs an edge dips through the first and the last.
+    #[test]
+    fn an_edge_across_several_ridges_is_let_out_across_each_of_the_outer_ones() {
+        let mut soup = TriangleSoup { vertices: vec![], faces: vec![] };
+        for x in [-3.0, 0.0, 3.0] {
+            let first = soup.vertices.len() as u32;
+            let one = roof(1.0);
+            soup.vertices.extend(one.vertices().iter().map(|at| at + Vector3::x() * x));
+            soup.faces.extend(one.faces().iter().map(|face| face.vertices.map(|vertex| first + vertex)));
+        }
+        let saw = Mesh::build(soup).unwrap().0;
+        let way = WayOut { along: Vector3::y(), most_m: 1.0, ahead_m: 0.0, lift: &|_| Vector3::zeros() };
+        for [from, to] in [[-5.0, 5.0], [-3.05, 5.0], [-3.05, 3.05]] {
+            let edge = Edge { ends: [from, to].map(|x| Vector3::new(x, 0.9, 0.3)) };
+            let mut at: Vec<_> = edge.cuts(&saw, &way).into_iter().flatten().collect();
+            at.sort_by(|a, b| a.on_edge.x.total_cmp(&b.on_edge.x));
+            let [first, last] = at[..] else { panic!("{from} {to}: {at:?}") };
+            for (cut, x) in [(first, -3.0), (last, 3.0)] {
+                assert!((cut.on_mesh - Vector3::new(x, 1.0, 0.3)).norm() < 1e-12, "{from} {to}: {cut:?}");
+                assert!((cut.gap_m + 0.1).abs() < 1e-12, "{cut:?}");
+            }
+        }
     }
 
     #[test]
