@@ -198,7 +198,12 @@ impl Pair {
                 let pressed_m = worked_m.max((worked_m + let_out_m).min(pushing_m));
                 anchor.granted_m = anchor.granted_m.max(depth_m - pressed_m);
             }
-            anchor.granted_m = anchor.granted_m.max(depth_m - squeezed_m);
+            if squeezed_m.is_finite() {
+                let is_carried = !comes_nearer(self.bodies.1, point, start);
+                let squeezed_m =
+                    if is_carried { squeezed_m.max(CARRIED * anchor.pressed_m) } else { squeezed_m };
+                anchor.granted_m = anchor.granted_m.max(depth_m - squeezed_m);
+            }
             is_let_out |= anchor.granted_m > 0.0;
             anchor.pressed_m = if point.gap_m < 0.0 { depth_m - anchor.granted_m } else { -point.gap_m };
             anchor.share = point.share;
@@ -241,8 +246,8 @@ impl Pair {
         self.throws_m(LET_OUT_M_S, start).max(self.surfacing.deepest_rest_m().min(REACH_M))
     }
 
-    /// Depth up to which what is driven presses \[m\]: it would squeeze things by any force, and they would be shot out. It goes
-    /// through what does not give way.
+    /// Depth up to which what is driven presses where it comes nearer \[m\]: it would squeeze things by any force, and they would be
+    /// shot out. It goes through what does not give way.
     fn squeezed_m(&self, start: &Start<'_>) -> f64 {
         let is_driven = self
             .bodies
@@ -445,8 +450,22 @@ pub(crate) fn is_near(a: &Entity, b: &Entity, reach_m: f64) -> bool {
         }
 }
 
+/// True where the second one moves into the first. Where it slides along, what it carries presses as deep as it did.
+fn comes_nearer(second: Option<usize>, point: &ContactPoint, start: &Start<'_>) -> bool {
+    second.is_some_and(|b| {
+        let motion = &start.motions[b];
+        let arm_W = point.point_W - start.bodies[b].centre_W;
+        let velocity_W = motion.velocity_W + motion.angular_velocity_W.cross(&arm_W);
+        velocity_W.dot(&point.normal_W) > ALONG * velocity_W.norm()
+    })
+}
+
 /// Speed at which things come out at most that something driven squeezes \[m/s\].
 const SQUEEZED_M_S: f64 = 1.0;
+/// So much deeper in a tick may press what is carried along.
+const CARRIED: f64 = 1.02;
+/// Sine of a way along a face that comes no nearer.
+const ALONG: f64 = 1e-3;
 /// Contact points are looked for from this distance on \[m\].
 pub(crate) const REACH_M: f64 = 1e-3;
 /// A contact point of another name within this distance is the same one \[m\].

@@ -6,7 +6,7 @@ use crate::noise::Noise;
 use crate::thrown::{KINDS, shape};
 
 use common::*;
-use haptics::{Cuboid, Entity};
+use haptics::{Cuboid, Entity, Sphere};
 use nalgebra::{Isometry3, Vector3};
 use physics::{Body, ContactStiffness, Settings};
 
@@ -61,6 +61,31 @@ fn what_is_driven_through_things_does_not_shoot_them_out() {
             assert!(fastest_m_s < 2.0, "{kind:?} at {tick}: {fastest_m_s} m/s");
         }
     }
+}
+
+/// Six plates of ten kilograms on three balls of a gram, on a plate that is driven along: nothing is squeezed.
+#[test]
+fn what_is_driven_along_carries_what_it_carried() {
+    let contact_stiffness = ContactStiffness::ByMass { damping_ratio: 1.0 };
+    let settings = Settings { contact_stiffness, ..Settings::default() };
+    let at = Isometry3::translation;
+    let plate = |size_m: [f64; 3], y: f64| object(Cuboid::new(size_m).unwrap(), at(0.0, y, 0.0), 1000.0, 0.5);
+    let mut entities = vec![plate([0.3, 0.02, 0.3], -0.01)];
+    for [x, z] in [[0.04, 0.0], [-0.02, 0.035], [-0.02, -0.035]] {
+        entities.push(object(Sphere::new(0.01).unwrap(), at(x, 0.01, z), 1000.0, 0.5));
+    }
+    entities.extend((0..6).map(|above| plate([0.12, 0.04, 0.12], 0.04 + 0.04 * f64::from(above))));
+    let mass_kg = |index: usize| if index < 4 { 1e-3 } else { 10.0 };
+    let bodies: Vec<_> = (1..10).map(|index| (index, body(&entities[index], mass_kg(index)))).collect();
+    let mut world = World::new(entities, &bodies, settings, 0);
+    for tick in 0..700 {
+        if tick >= 300 {
+            assert!(world.manipulation.drive(0, at(1e-4 * f64::from(tick - 299), -0.01, 0.0)));
+        }
+        world.step(&[]);
+    }
+    let lowered_m = 0.04 - world.entities[4].X_WB.translation.y;
+    assert!(lowered_m < 2e-4, "{lowered_m} m");
 }
 
 #[test]
