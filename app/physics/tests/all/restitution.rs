@@ -218,6 +218,32 @@ fn all_of_four_hundred_balls_that_land_at_once_bounce() {
     assert!(highest_m.iter().all(|m| (m / (0.64 * HEIGHT_M) - 1.0).abs() < 1e-5), "{highest_m:?}");
 }
 
+/// A light ball between a wall and a heavy one that comes bounces pi times the root of their ratio as often: near the wall all
+/// within a tick, and beyond 128 times what is left is lost; far from it over many ticks, in which one may be stopped.
+#[test]
+fn a_light_ball_between_a_wall_and_a_heavy_one_turns_it_back_or_stops_it() {
+    let settings = Settings { gravity_W: Vector3::zeros(), ..responses(1.0)[0] };
+    for (rate_hz, height_m) in RATES_HZ.into_iter().flat_map(|hz| [1e-4, 0.02].map(|height_m| (hz, height_m)))
+    {
+        for ratio in [20.0, 100.0, 1e4, 1e6] {
+            let mut entities = vec![floor(0.0, 1000.0, 0.0), ball(height_m), ball(0.1)];
+            let heavy = body(&entities[2], 1e-3 * ratio).moving(-Vector3::y(), Vector3::zeros());
+            let bodies = [(1, body(&entities[1], 1e-3)), (2, heavy)];
+            let mut manipulation = Manipulation::new(&entities, &bodies, settings).unwrap();
+            let began_j = heavy.kinetic_energy_j();
+            let mut left = 1.0;
+            for _ in 0..(0.1 * rate_hz) as usize {
+                manipulation.step(&mut entities, &mut [], rate_hz.recip());
+                let all_j: f64 = manipulation.bodies().iter().map(Body::kinetic_energy_j).sum();
+                left = all_j / began_j;
+                assert!(left < 1.0 + 1e-9, "{rate_hz} Hz, {height_m} m, {ratio}: {left}");
+            }
+            let is_kept = left > 0.995;
+            assert!(height_m > 1e-3 || is_kept == (ratio < 1000.0), "{rate_hz} Hz, {ratio}: {left}");
+        }
+    }
+}
+
 /// One corner comes after the other, within a tick or two, and each bounce drives another one down.
 #[test]
 fn what_tumbles_without_friction_keeps_its_energy_in_every_bounce() {
