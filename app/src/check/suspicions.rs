@@ -6,6 +6,8 @@
 //! arm reaches, turning faster than a drill, or written down twice a second at most while hardly moving are told, with the
 //! number that was probably meant.
 
+#![allow(non_snake_case)] // Frames are capital letters.
+
 use super::measures::{Measures, short};
 use crate::rig::{Rig, in_words};
 use nalgebra::{Quaternion, Vector3};
