@@ -177,6 +177,7 @@ fn check_warns_of_what_runs_but_hardly_as_meant() {
     for wanted in [
         "rock (90000 N/m) may buzz: at 1000 Hz and 0 N s/m a lightly held Premium stands",
         "die begins 20.00 mm deep in rock",
+        "nothing is below die",
         "finger f0 starts inside of around",
         "none.obj: no such file",
         "no entity is made from template unused",
@@ -187,7 +188,7 @@ fn check_warns_of_what_runs_but_hardly_as_meant() {
             "{wanted}: {warnings:?}"
         );
     }
-    assert_eq!(warnings.len(), 5, "{warnings:?}");
+    assert_eq!(warnings.len(), 6, "{warnings:?}");
     assert_eq!(told["summary"]["entities"]["moving"], 1);
     assert_eq!(told["summary"]["shapes"]["sphere"], 2);
 }
