@@ -102,6 +102,8 @@ impl Cascade {
             let has_met = self.has_met(meeting.row);
             if has_met || meeting.meets(dt_s) {
                 meeting.stop(row, dt_s);
+            } else if meeting.is_among_many && meeting.will_come() {
+                meeting.pass_by(row);
             }
             if has_met {
                 // What bounces does not roll: a torque as large as the impulse would drive it.

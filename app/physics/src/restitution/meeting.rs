@@ -131,6 +131,16 @@ impl Meeting {
             || !self.is_held && self.approaches_m_s > self.calm_m_s && self.gap_m < closes_m_s * dt_s
     }
 
+    /// True of one that came to approach by another bounce, and would bounce later.
+    pub(super) fn will_come(&self) -> bool {
+        self.bounces() && self.gap_m > 0.0 && self.approaches_m_s > self.calm_m_s
+    }
+
+    /// Lets it in, as far as it comes in what is left of the tick: to be stopped there would cost it its bounce.
+    pub(super) fn pass_by(&self, row: &mut Row) {
+        (row.stiffness, row.damping, row.rest_W) = Default::default();
+    }
+
     /// With which normal velocity it leaves the tick if it meets what it touches; `None`: it stays.
     pub(super) fn leaves_m_s(&self, dt_s: f64) -> Option<f64> {
         match self.leaves(dt_s) {
