@@ -81,7 +81,7 @@ impl Edge {
         })
     }
 
-    /// What of it is in the mesh, or, where it goes in and out several times, the first and the last of that.
+    /// The part of it in the mesh, or, where it goes in and out several times, the first and the last one.
     fn parts(&self, mesh: &Mesh, hits: &[Option<Hit>; 2]) -> [Option<Part>; 2] {
         let whole = Some(Part { ends: self.ends, hits: *hits });
         if mesh.sides() == Sides::Sheet || hits.iter().all(Option::is_none) {
@@ -125,7 +125,7 @@ impl Part {
         dips(mesh, &insides, way).or_else(|| dips(mesh, &self.entered(mesh, way), way))
     }
 
-    /// Where it comes in at either end, however the faces look there.
+    /// The points at which it comes in at either end, however the faces look there.
     fn entered<'m>(&self, mesh: &'m Mesh, way: &WayOut<'_>) -> [Option<Inside<'m>>; 2] {
         [0, 1].map(|at| entered(mesh, self.hits[at].as_ref()?, way, LOOKS_AWAY))
     }
@@ -137,7 +137,7 @@ struct Inside<'m> {
     face: &'m Face,
 }
 
-/// Where an edge comes in, seen from one end; or that end, if it is inside already.
+/// The point at which an edge comes in, seen from one end; or that end, if it is inside already.
 fn inside<'m>(
     mesh: &'m Mesh,
     hit: Option<&Hit>,
@@ -155,7 +155,7 @@ fn inside<'m>(
     Some(Inside { at, face })
 }
 
-/// Where it comes in, if that is through a face that looks along the way out by so much.
+/// The point at which it comes in, if that is through a face that looks along the way out by so much.
 fn entered<'m>(mesh: &'m Mesh, hit: &Hit, way: &WayOut<'_>, looks: f64) -> Option<Inside<'m>> {
     let face = &mesh.faces()[hit.face as usize];
     (face.normal_B.dot(&way.along) > looks).then_some(Inside { at: hit.point_B, face })

@@ -165,7 +165,7 @@ fn a_round_bar_lies_across_two_others_wherever_they_are() {
     }
 }
 
-/// How deep two convex bars are in each other (m), by the least overlap along all normals and all that is across two edges.
+/// Depth of two convex bars in each other (m): the least overlap along all normals and all that is across two edges.
 fn depth_m(sides: u32, poses: [&Isometry3<f64>; 2]) -> f64 {
     let corner = |at: f64| {
         let (sin, cos) = (TAU * at / f64::from(sides) + FRAC_PI_2).sin_cos();
