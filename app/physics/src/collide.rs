@@ -42,6 +42,7 @@ mod mesh_other;
 mod mesh_own;
 mod mesh_patch;
 mod mesh_plane;
+mod mesh_ridge;
 mod mesh_ring;
 mod mesh_role;
 mod mesh_search;
