@@ -27,6 +27,7 @@ mod build;
 mod bvh;
 mod change;
 mod cone;
+mod convexity;
 mod crack;
 mod crossed;
 mod crossing;
@@ -100,6 +101,8 @@ pub struct Mesh {
     has_inside: bool,
     extent_m: f64,
     longest_edge_m: f64,
+    /// Of a convex solid.
+    convex_inner_m: Option<f64>,
     /// Of all meshes that this process has built, which. An address would be another mesh's as soon as this one is gone.
     identity: u64,
     /// Texture coordinates of each face's corners, where somebody gave any: 24 bytes a face beside its 64.
@@ -138,7 +141,7 @@ impl Mesh {
             face.sides = Sides::Sheet;
             (face.is_crossed, face.is_beside, face.is_at_ledge) = (false, false, false);
         }
-        Self { sides: Sides::Sheet, has_inside: false, ..self }
+        Self { sides: Sides::Sheet, has_inside: false, convex_inner_m: None, ..self }
     }
 
     /// Solid if all of its parts are; each [`Face`] says it of its own part.

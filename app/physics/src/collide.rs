@@ -7,7 +7,7 @@
 //!   flat pieces (`overlay`) and lines (`lines`) share; on planes the same with the plane's normal;
 //! - balls on anything that tells its nearest point: `ball`; rings, as a ball that is swept along a circle: `ring`, and where
 //!   they are deep, all along it: `ring_deep`;
-//! - meshes with anything: `mesh`.
+//! - meshes with anything: `mesh`; convex ones with convex ones along the direction in which they touch, too.
 //!
 //! Who cannot meet says [`is_collidable`]: trees of shapes with nothing, NURBS and surfaces of one's own with balls only, a
 //! torus that is scaled by different factors with balls only, a torus not with other scaled forms.
@@ -35,6 +35,7 @@ mod lines;
 pub(crate) mod mesh;
 mod mesh_ball;
 mod mesh_carry;
+mod mesh_convex;
 mod mesh_corner;
 mod mesh_cut;
 mod mesh_found;

@@ -126,8 +126,11 @@ impl Manipulation {
     }
 
     fn of(entities: &[Entity], bodies: &[(usize, Body)], settings: Settings) -> Self {
-        for (entity, _) in bodies {
-            if let Shape::Mesh(mesh) = &entities[*entity].shape {
+        for (number, entity) in entities.iter().enumerate() {
+            let may_move = || bodies.iter().any(|(body, _)| *body == number);
+            if let Shape::Mesh(mesh) = &entity.shape
+                && (may_move() || !bodies.is_empty() && mesh.convex_inner_m().is_some())
+            {
                 mesh.find_extremes();
             }
         }

@@ -117,6 +117,7 @@ impl Mesh {
             has_inside,
             extent_m,
             longest_edge_m,
+            convex_inner_m: None,
             identity,
             uv: None,
             labels: None,
@@ -131,6 +132,7 @@ impl Mesh {
             mesh.mark_crossed();
         }
         mesh.mark_ledges();
+        mesh.convex_inner_m = if parts.len() == 1 { mesh.find_convex_inner_m() } else { None };
         Ok((mesh, report))
     }
 }

@@ -8,6 +8,7 @@ mod mesh_oracle;
 
 mod accuracy;
 mod build;
+mod convexity;
 mod cracks;
 mod crossing;
 mod energy;

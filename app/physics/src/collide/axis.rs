@@ -41,11 +41,13 @@ const SAME: f64 = 1e-12;
 const NEAR: f64 = 1e-3;
 /// As deep as this share of the smaller inner radius, other ways out are looked at.
 const DEEP: f64 = 0.75;
+/// Faces of a mesh that are looked at as ways out.
+const MOST_FACES: usize = 32;
 /// Another way out must be shorter by this.
 const SHORTER: f64 = 0.5;
 
 /// `last`: the direction in the last tick, if there was one.
-pub(super) fn find(a: &Convex, b: &Convex, last: Option<Vector3<f64>>) -> Axis {
+pub(super) fn find(a: &Convex<'_>, b: &Convex<'_>, last: Option<Vector3<f64>>) -> Axis {
     let inner_m = a.inner_m().min(b.inner_m());
     let radii_m = a.radius_m + b.radius_m;
     let room_m = ROOM * inner_m;
@@ -73,21 +75,21 @@ pub(super) fn find(a: &Convex, b: &Convex, last: Option<Vector3<f64>>) -> Axis {
 }
 
 impl Axis {
-    fn along(a: &Convex, b: &Convex, normal: Vector3<f64>) -> Self {
+    fn along(a: &Convex<'_>, b: &Convex<'_>, normal: Vector3<f64>) -> Self {
         let on_a = a.support(&-normal);
         Self { normal, gap_m: normal.dot(&(on_a - b.support(&normal))), on_a }
     }
 }
 
 /// `s(n)`.
-fn separation(a: &Convex, b: &Convex, normal: &Vector3<f64>) -> f64 {
+fn separation(a: &Convex<'_>, b: &Convex<'_>, normal: &Vector3<f64>) -> f64 {
     normal.dot(&(a.support(&-normal) - b.support(normal)))
 }
 
 /// The direction of their distance; `None` if the cores overlap.
-fn apart(a: &Convex, b: &Convex, room_m: f64) -> Option<Vector3<f64>> {
+fn apart(a: &Convex<'_>, b: &Convex<'_>, room_m: f64) -> Option<Vector3<f64>> {
     let gap = Gap { a, b, shift: Vector3::zeros() };
-    let start = unit(&(a.origin - b.origin)).unwrap_or_else(Vector3::y);
+    let start = unit(&(a.middle() - b.middle())).unwrap_or_else(Vector3::y);
     unit(&gap.nearest(&start, APART * room_m)?.away)
 }
 
@@ -95,7 +97,7 @@ fn apart(a: &Convex, b: &Convex, room_m: f64) -> Option<Vector3<f64>> {
 const APART: f64 = 1e-6;
 
 /// The nearest direction in which the gap is largest.
-fn ascend(a: &Convex, b: &Convex, mut normal: Vector3<f64>, room_m: f64) -> Axis {
+fn ascend(a: &Convex<'_>, b: &Convex<'_>, mut normal: Vector3<f64>, room_m: f64) -> Axis {
     let mut axis = Axis::along(a, b, normal);
     for _ in 0..MAX_TURNS {
         let shift = normal * (room_m - axis.gap_m).max(0.0);
@@ -119,11 +121,21 @@ fn ascend(a: &Convex, b: &Convex, mut normal: Vector3<f64>, room_m: f64) -> Axis
 }
 
 /// Of the directions in which faces look, and that between the origins, the one with the largest gap.
-fn shortest_way_out(a: &Convex, b: &Convex) -> Vector3<f64> {
-    let between = a.origin - b.origin;
+fn shortest_way_out(a: &Convex<'_>, b: &Convex<'_>) -> Vector3<f64> {
+    let between = a.middle() - b.middle();
     let mut best = unit(&between).unwrap_or_else(Vector3::y);
     let mut best_m = separation(a, b, &best);
-    for form in [a, b] {
+    for (form, sign) in [(a, -1.0), (b, 1.0)] {
+        if let Core::Hull(mesh) = form.core {
+            for face in mesh.faces().iter().step_by(mesh.faces().len().div_ceil(MOST_FACES)) {
+                let normal = form.rotation * (face.normal_B * sign);
+                let gap_m = separation(a, b, &normal);
+                if gap_m > best_m {
+                    (best, best_m) = (normal, gap_m);
+                }
+            }
+            continue;
+        }
         for axis in 0..3 {
             let along: Vector3<f64> = form.rotation.column(axis).into();
             for mut normal in [along, -along] {

@@ -6,12 +6,15 @@
 //! Frames: B is the frame in which two forms meet; each form is placed in it.
 
 use haptics::Form;
+use haptics::mesh::Mesh;
 use nalgebra::{Isometry3, Matrix3, Vector3};
 
-/// A convex form, placed.
+use super::mesh_corner::Corner;
+
+/// A convex form, or a convex mesh, placed.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Convex {
-    pub(super) core: Core,
+pub(super) struct Convex<'m> {
+    pub(super) core: Core<'m>,
     /// All points within this distance of the core belong to it \[m\].
     pub(super) radius_m: f64,
     /// Scaled along its axes.
@@ -22,7 +25,7 @@ pub(super) struct Convex {
 
 /// What is left of a form without its radius.
 #[derive(Debug, Clone, Copy)]
-pub(super) enum Core {
+pub(super) enum Core<'m> {
     Point,
     /// A piece of the y axis, and a radius that scaling has made no radius.
     Segment {
@@ -40,9 +43,10 @@ pub(super) enum Core {
     Ellipsoid {
         radii_m: Vector3<f64>,
     },
+    Hull(&'m Mesh),
 }
 
-impl Convex {
+impl<'m> Convex<'m> {
     /// `None` for planes and rings.
     pub(super) fn of(form: &Form, pose: &Isometry3<f64>) -> Option<Self> {
         let (form, factors) = match form {
@@ -73,6 +77,14 @@ impl Convex {
         Some(Self { core, radius_m, factors, rotation, origin: pose.translation.vector })
     }
 
+    /// `None` for meshes that are not convex.
+    pub(super) fn of_mesh(mesh: &'m Mesh, pose: &Isometry3<f64>) -> Option<Self> {
+        mesh.convex_inner_m()?;
+        let rotation = pose.rotation.to_rotation_matrix().into_inner();
+        let origin = pose.translation.vector;
+        Some(Self { core: Core::Hull(mesh), radius_m: 0.0, factors: None, rotation, origin })
+    }
+
     /// The core's farthest point in a direction, which need not be a unit vector.
     #[inline]
     pub(super) fn support(&self, direction: &Vector3<f64>) -> Vector3<f64> {
@@ -99,6 +111,13 @@ impl Convex {
         self.placed_vector(own) + self.origin
     }
 
+    /// About the middle of it.
+    pub(super) fn middle(&self) -> Vector3<f64> {
+        let Core::Hull(mesh) = self.core else { return self.origin };
+        let [low, high] = mesh.bounds_B();
+        self.placed_point(&((low + high) * 0.5))
+    }
+
     /// A measure of its size: of the ball within \[m\].
     pub(super) fn inner_m(&self) -> f64 {
         let of_core = match self.core {
@@ -106,13 +125,14 @@ impl Convex {
             Core::Box { half_m } => half_m.min(),
             Core::Frustum { half_m, radii_m: [a, b] } => half_m.min(0.5 * (a + b)),
             Core::Ellipsoid { radii_m } => radii_m.min(),
+            Core::Hull(mesh) => mesh.convex_inner_m().unwrap_or(0.0),
         };
         let swollen_m = if let Core::Segment { swollen_m, .. } = self.core { swollen_m } else { 0.0 };
         (of_core + swollen_m) * self.factors.map_or(1.0, |f| f.min()) + self.radius_m
     }
 }
 
-impl Core {
+impl Core<'_> {
     #[inline]
     fn support(&self, d: &Vector3<f64>) -> Vector3<f64> {
         match self {
@@ -135,6 +155,26 @@ impl Core {
                 let length = stretched.norm();
                 if length > 0.0 { stretched.component_mul(radii_m) / length } else { Vector3::zeros() }
             }
+            Self::Hull(mesh) => farthest(mesh, d),
         }
     }
 }
+
+/// The vertex of a convex mesh that lies farthest in a direction.
+fn farthest(mesh: &Mesh, d: &Vector3<f64>) -> Vector3<f64> {
+    let vertices = mesh.vertices();
+    if vertices.len() <= FEW {
+        let farther = |most: &'_ Vector3<f64>, at: &Vector3<f64>| d.dot(at) > d.dot(most);
+        return vertices.iter().fold(vertices[0], |most, at| if farther(&most, at) { *at } else { most });
+    }
+    let from = Corner::new(mesh.extreme(d).unwrap_or(0));
+    // Over what is flat it does not go on for less.
+    let per_step = (STEP * mesh.extent_m() * d.norm()).recip();
+    let (corner, _) = from.climb(mesh, |corner| (d.dot(corner.point_M(mesh)) * per_step).floor());
+    *corner.point_M(mesh)
+}
+
+/// What a vertex must be farther by to be the farthest, in extents.
+const STEP: f64 = 1e-9;
+/// Of so few vertices each is looked at.
+const FEW: usize = 24;

@@ -58,7 +58,7 @@ pub(super) const CORNERS: [(f64, f64); 4] = [(1.0, 1.0), (-1.0, 1.0), (-1.0, -1.
 
 impl Facet {
     /// What of the form looks in this direction, flat pieces first.
-    pub(super) fn of(form: &Convex, toward: &Vector3<f64>) -> Self {
+    pub(super) fn of(form: &Convex<'_>, toward: &Vector3<f64>) -> Self {
         let own = form.own_direction(toward);
         match form.core {
             Core::Box { half_m } => Self::Plate(face(form, &half_m, &own)),
@@ -80,7 +80,7 @@ impl Facet {
     }
 
     /// The same without flat pieces.
-    pub(super) fn edge_of(form: &Convex, toward: &Vector3<f64>) -> Self {
+    pub(super) fn edge_of(form: &Convex<'_>, toward: &Vector3<f64>) -> Self {
         let own = form.own_direction(toward);
         match form.core {
             Core::Box { half_m } => {
@@ -118,7 +118,7 @@ fn edge_number(a: u32, b: u32) -> u32 {
     axis * 4 + (both >> low & 1) + 2 * (both >> high & 1)
 }
 
-fn face(form: &Convex, half_m: &Vector3<f64>, own: &Vector3<f64>) -> Plate {
+fn face(form: &Convex<'_>, half_m: &Vector3<f64>, own: &Vector3<f64>) -> Plate {
     let axis = own.iamax();
     let (i, j) = ((axis + 1) % 3, (axis + 2) % 3);
     let along = |axis: usize, length_m: f64| {
@@ -140,14 +140,14 @@ fn face(form: &Convex, half_m: &Vector3<f64>, own: &Vector3<f64>) -> Plate {
 }
 
 /// Points of both rims that look there most, the upper one's first.
-fn side_line(form: &Convex, half_m: f64, [bottom_m, top_m]: [f64; 2], own: &Vector3<f64>) -> Line {
+fn side_line(form: &Convex<'_>, half_m: f64, [bottom_m, top_m]: [f64; 2], own: &Vector3<f64>) -> Line {
     let out = unit(&Vector3::new(own.x, 0.0, own.z)).unwrap_or_else(Vector3::x);
     let at = |radius_m: f64, y: f64| form.placed_point(&(out * radius_m + Vector3::y() * y));
     let bend_m = form.placed_vector(&(out * (0.5 * (bottom_m + top_m)))).norm();
     Line { ends: [at(top_m, half_m), at(bottom_m, -half_m)], ids: [RIM_IDS, RIM_IDS + 4], bend_m }
 }
 
-fn cap(form: &Convex, is_top: bool, half_m: f64, radii_m: [f64; 2], own: &Vector3<f64>) -> Plate {
+fn cap(form: &Convex<'_>, is_top: bool, half_m: f64, radii_m: [f64; 2], own: &Vector3<f64>) -> Plate {
     let side = side_line(form, half_m, radii_m, own);
     let (sign, radius_m) = if is_top { (1.0, radii_m[1]) } else { (-1.0, radii_m[0]) };
     Plate {

@@ -28,7 +28,11 @@ const STEP: f64 = 1e-5;
 const FOUND: f64 = 1e-11;
 
 /// From the direction of the last tick to that of this one, and where on A's core they touch.
-pub(super) fn follow(a: &Convex, b: &Convex, last: &Vector3<f64>) -> Option<(Vector3<f64>, Vector3<f64>)> {
+pub(super) fn follow(
+    a: &Convex<'_>,
+    b: &Convex<'_>,
+    last: &Vector3<f64>,
+) -> Option<(Vector3<f64>, Vector3<f64>)> {
     let facets = [Facet::of(a, &-last), Facet::of(b, last)];
     let mut is_at_face = false;
     for (facet, other, sign) in [(facets[1], a, 1.0), (facets[0], b, -1.0)] {
@@ -46,7 +50,7 @@ pub(super) fn follow(a: &Convex, b: &Convex, last: &Vector3<f64>) -> Option<(Vec
     if is_at_face {
         return None;
     }
-    let line = |form: &Convex, toward: &Vector3<f64>| match Facet::edge_of(form, toward) {
+    let line = |form: &Convex<'_>, toward: &Vector3<f64>| match Facet::edge_of(form, toward) {
         Facet::Line(line) => Some(line).filter(|line| along(line).dot(toward).abs() < NEAR_LINE),
         _ => None,
     };
@@ -95,12 +99,17 @@ fn crossing(a: &Line, b: &Line) -> Option<Vector3<f64>> {
 }
 
 /// Difference of the farthest points.
-fn difference(a: &Convex, b: &Convex, n: &Vector3<f64>) -> Vector3<f64> {
+fn difference(a: &Convex<'_>, b: &Convex<'_>, n: &Vector3<f64>) -> Vector3<f64> {
     a.support(&-n) - b.support(n)
 }
 
 /// Turned about a line that both keep touching along.
-fn about_line(a: &Convex, b: &Convex, last: Vector3<f64>, line: &Vector3<f64>) -> Option<Vector3<f64>> {
+fn about_line(
+    a: &Convex<'_>,
+    b: &Convex<'_>,
+    last: Vector3<f64>,
+    line: &Vector3<f64>,
+) -> Option<Vector3<f64>> {
     let mut n = unit(&(last - line * line.dot(&last)))?;
     let mut before = f64::INFINITY;
     for _ in 0..ROUNDS {
@@ -124,7 +133,7 @@ fn about_line(a: &Convex, b: &Convex, last: Vector3<f64>, line: &Vector3<f64>) -
 }
 
 /// In both directions.
-fn on_round(a: &Convex, b: &Convex, last: Vector3<f64>) -> Option<Vector3<f64>> {
+fn on_round(a: &Convex<'_>, b: &Convex<'_>, last: Vector3<f64>) -> Option<Vector3<f64>> {
     let mut n = last;
     let mut before = f64::INFINITY;
     for _ in 0..ROUNDS {

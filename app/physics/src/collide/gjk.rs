@@ -12,8 +12,8 @@ use super::convex::Convex;
 
 /// Two cores, the first moved by `shift`.
 pub(super) struct Gap<'c> {
-    pub(super) a: &'c Convex,
-    pub(super) b: &'c Convex,
+    pub(super) a: &'c Convex<'c>,
+    pub(super) b: &'c Convex<'c>,
     pub(super) shift: Vector3<f64>,
 }
 

@@ -43,6 +43,11 @@ impl Found {
         self.begins[patch..].fill(self.count);
     }
 
+    /// Those of the place whose turn it is.
+    pub(super) fn own(&self) -> &[Contact] {
+        &self.contacts[self.begins[self.patch]..self.count]
+    }
+
     /// Those of a place whose turn is over, seen along its normal; if there are several, they share their depths.
     pub(super) fn end(&mut self, normal_M: &Vector3<f64>, are_several: bool) -> &[Contact] {
         let begin = self.begins[self.patch];
@@ -97,7 +102,20 @@ impl Found {
             if there >= begin && (deeper_m > together_m || stays) {
                 self.contacts[there] = contact;
             }
-        } else if let Some(place) = self.contacts.get_mut(self.count) {
+        } else {
+            self.add(contact);
+        }
+    }
+
+    /// Whatever is near it.
+    pub(super) fn push_apart(&mut self, mut contact: Contact) {
+        contact.carried = self.carried.contains(&contact.id);
+        contact.id |= (self.patch as u32) << PATCH_SHIFT;
+        self.add(contact);
+    }
+
+    fn add(&mut self, contact: Contact) {
+        if let Some(place) = self.contacts.get_mut(self.count) {
             *place = contact;
             self.count += 1;
         }

@@ -12,6 +12,7 @@
 //! would be as deep as it is far from the edge that stands there, and come and go with micrometres.
 //! Frames: the mesh's frame M; normals from the mesh to the other one.
 //! Of all that is found, what [carries](super::mesh_carry) counts.
+//! Two convex ones meet in one place, whose plane is that along which they touch ([`mesh_convex`](super::mesh_convex)).
 //! Limits: six places a pair. Crossings are found of a box's edges, of the lines along which cylinders, cones and capsules
 //! touch, and of sharp or long edges that leave the vertices of a mesh that were chosen, as far as these go straight on; where
 //! they bend, vertices lie as near. Rims of round forms are not cut off. An ellipsoid touches with one point: a flat one that tumbles comes down on its
@@ -26,6 +27,7 @@ use nalgebra::{Isometry3, Point3, Vector3};
 
 use super::PairMemory;
 use super::mesh::{About, Contact, Told};
+use super::mesh_convex::Touch;
 use super::mesh_corner::Corner;
 use super::mesh_cut::{Edge, WayOut};
 use super::mesh_found::Found;
@@ -44,20 +46,31 @@ pub(super) fn contact_points(
     told: &mut Told<'_>,
 ) {
     let travel_m = (reach_m - crate::pair::REACH_M).max(0.0);
+    let touch = Touch::of(mesh, other, &mut memory.words);
     let patches = &mut memory.patches;
-    if !meet(mesh, other, reach_m, patches) {
+    let do_meet = match &touch {
+        Some(touch) => touch.gap_m <= reach_m,
+        None => meet(mesh, other, reach_m, patches),
+    };
+    if !do_meet {
         if patches.all[0].is_known {
             *patches = Patches::default();
         }
         return;
     }
     let was_pressed = patches.are_pressed();
-    let mut found = find(mesh, other, [reach_m, travel_m], patches);
-    if was_pressed && !patches.are_pressed() {
+    if let Some(touch) = &touch {
+        patches.meet_at(touch);
+    } else {
+        look_around(mesh, other, reach_m, travel_m, patches);
+    }
+    let mut found = find(mesh, other, [reach_m, travel_m], patches, touch.as_ref());
+    if touch.is_none() && was_pressed && !patches.are_pressed() {
         // The plane of the last tick's points shows them no more: as if there had been none.
         let mut anew = *patches;
         if meet(mesh, other, reach_m, &mut anew) {
-            let found_anew = find(mesh, other, [reach_m, travel_m], &mut anew);
+            look_around(mesh, other, reach_m, travel_m, &mut anew);
+            let found_anew = find(mesh, other, [reach_m, travel_m], &mut anew, None);
             if anew.are_pressed() {
                 (found, *patches) = (found_anew, anew);
             }
@@ -69,17 +82,23 @@ pub(super) fn contact_points(
 }
 
 /// All contacts, of each place by its plane.
-fn find(mesh: &Mesh, other: &Other<'_>, [reach_m, travel_m]: [f64; 2], patches: &mut Patches) -> Found {
-    look_around(mesh, other, reach_m, travel_m, patches);
+fn find(
+    mesh: &Mesh,
+    other: &Other<'_>,
+    [reach_m, travel_m]: [f64; 2],
+    patches: &mut Patches,
+    touch: Option<&Touch>,
+) -> Found {
     let mut found = Found::new();
     for number in 0..MAX_PATCHES {
         found.begin(number, &patches.all[number].carried);
         if patches.all[number].is_known {
             let meeting = Meeting::of(&patches.all[number], reach_m, travel_m);
             let mut stands = patches.all[number].stands;
-            let mut place = Place { mesh, other, meeting, number, patches, found: &mut found };
+            let mut place = Place { mesh, other, meeting, number, patches, touch, found: &mut found };
             place.vertices(&mut stands[0]);
             place.owns(&mut stands[1]);
+            place.touch();
             patches.all[number].stands = stands;
             let are_several = patches.are_several();
             patches.all[number].remember(found.end(&meeting.normal_M, are_several));
@@ -146,6 +165,17 @@ fn lowest(mesh: &Mesh, other: &Other<'_>, at_M: &Vector3<f64>) -> Option<(Seen, 
     Some((seen, point_M - seen.out * seen.gap_m))
 }
 
+impl Patches {
+    /// The only place of two convex ones.
+    fn meet_at(&mut self, touch: &Touch) {
+        self.searched = None;
+        self.all[1..].iter_mut().for_each(|patch| patch.is_known = false);
+        let first = &mut self.all[0];
+        (first.normal_M, first.at_M, first.depth_m) = (touch.normal_M, touch.at_M, (-touch.gap_m).max(0.0));
+        first.is_known = true;
+    }
+}
+
 impl Patch {
     /// The mean of the contact points, by their depth. Where nothing presses any more, it stays where it was.
     fn remember(&mut self, contacts: &[Contact]) {
@@ -170,6 +200,7 @@ struct Place<'m> {
     meeting: Meeting,
     number: usize,
     patches: &'m Patches,
+    touch: Option<&'m Touch>,
     found: &'m mut Found,
 }
 
@@ -362,9 +393,21 @@ impl Place<'_> {
         });
     }
 
+    /// Where two convex ones touch, if nothing else presses there.
+    fn touch(&mut self) {
+        let contact = self.touch.and_then(|touch| touch.unless_found(self.found.own()));
+        contact.into_iter().for_each(|contact| self.found.push_apart(contact));
+    }
+
     /// Points of another place that one finds. A corner that is beside a single place by next to nothing would take the room of
     /// one that is on it.
     fn push(&mut self, contact: Contact) {
+        if let Some(touch) = self.touch {
+            if contact.gap_m <= self.meeting.reach_m && touch.counts(&contact) {
+                self.found.push(contact);
+            }
+            return;
+        }
         let is_near = contact.gap_m <= self.meeting.reach_m;
         let is_single = self.meeting.depth_m > 0.0 && self.patches.is_alone(self.number);
         let is_beside =

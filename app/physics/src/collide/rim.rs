@@ -18,7 +18,7 @@ use super::overlay::FLAT;
 use super::spots::{Spot, Spots};
 
 /// Contact points of both rims with a half-space, whose frame is B; `begins`: the angle at which the points begin.
-pub(super) fn on_plane(form: &Convex, plane: &Plane, begins: &mut f64, spots: &mut Spots) {
+pub(super) fn on_plane(form: &Convex<'_>, plane: &Plane, begins: &mut f64, spots: &mut Spots) {
     let Core::Frustum { half_m, radii_m: [bottom_m, top_m] } = form.core else { return };
     let normal = plane.normal_B();
     let [u, v] = [Vector3::x(), Vector3::z()].map(|axis| form.placed_vector(&axis));

@@ -47,6 +47,7 @@ mod let_out;
 mod limit_surface;
 mod meshes_bars;
 mod meshes_bumps;
+mod meshes_convex;
 mod meshes_floor;
 mod meshes_mass;
 mod meshes_oracle;

@@ -1,0 +1,148 @@
+//! Sharp convex meshes that come down on each other: whatever of them touches, they do not get into each other, and slide off.
+#![allow(non_snake_case)]
+
+use std::f64::consts::TAU;
+
+use crate::{common, meshes, noise};
+
+use common::*;
+use haptics::Shape;
+use haptics::mesh::{TriangleSoup, make};
+use nalgebra::{Isometry3, Point3, Vector3};
+use noise::Noise;
+use physics::{ContactStiffness, Settings};
+
+/// From a base over x and y with so many corners to a top of this share of it.
+fn frustum(sides: u32, radius_m: f64, top: f64, length_m: f64) -> TriangleSoup {
+    let corner = |at: u32| {
+        let (sin, cos) = (TAU * f64::from(at) / f64::from(sides)).sin_cos();
+        [radius_m * cos, radius_m * sin]
+    };
+    let outline: Vec<_> = (0..sides).map(corner).collect();
+    let fan: Vec<_> = (2..sides).map(|at| [0, at - 1, at]).collect();
+    let mut soup = meshes::prism(&outline, &fan, length_m);
+    for vertex in soup.vertices.iter_mut().filter(|vertex| vertex.z > 0.0) {
+        (vertex.x, vertex.y) = (vertex.x * top, vertex.y * top);
+    }
+    soup
+}
+
+/// Tetrahedron, pyramid, cone, roof, wedge, bars, plank, plate and cube, of 1 to 80 mm.
+fn sharp() -> Vec<TriangleSoup> {
+    let corners = [[1.0, 1.0, 1.0], [1.0, -1.0, -1.0], [-1.0, 1.0, -1.0], [-1.0, -1.0, 1.0]];
+    let tetrahedron = TriangleSoup {
+        vertices: corners.map(|at| Vector3::from(at) * 0.015).into(),
+        faces: vec![[0, 1, 2], [0, 3, 1], [0, 2, 3], [1, 3, 2]],
+    };
+    let roof = [[-0.02, -0.02], [0.02, -0.02], [0.02, 0.0], [0.0, 0.02], [-0.02, 0.0]];
+    vec![
+        tetrahedron,
+        frustum(4, 0.025, 0.02, 0.03),
+        frustum(8, 0.02, 0.1, 0.05),
+        meshes::prism(&roof, &[[0, 1, 2], [0, 2, 4], [2, 3, 4]], 0.08),
+        meshes::prism(&[[-0.002, 0.0], [0.0, -0.04], [0.002, 0.0]], &[[0, 1, 2]], 0.08),
+        frustum(3, 0.01, 1.0, 0.08),
+        frustum(12, 0.01, 1.0, 0.08),
+        make::cuboid([0.02, 0.004, 0.2]),
+        make::cuboid([0.06, 0.001, 0.06]),
+        make::cuboid([0.03; 3]),
+    ]
+}
+
+/// What a convex solid's overlap with another is measured along.
+struct Polytope {
+    corners: Vec<Vector3<f64>>,
+    normals: Vec<Vector3<f64>>,
+    edges: Vec<Vector3<f64>>,
+}
+
+impl Polytope {
+    fn of(soup: &TriangleSoup) -> Self {
+        let at = |corner: u32| soup.vertices[corner as usize];
+        let (mut normals, mut edges) = (vec![], vec![]);
+        let note = |all: &mut Vec<Vector3<f64>>, way: Vector3<f64>| {
+            let way = way.normalize();
+            if !all.iter().any(|one: &Vector3<f64>| one.cross(&way).norm() < 1e-9) {
+                all.push(way);
+            }
+        };
+        for [a, b, c] in soup.faces.iter().copied() {
+            note(&mut normals, (at(b) - at(a)).cross(&(at(c) - at(a))));
+            [(a, b), (b, c), (c, a)].into_iter().for_each(|(a, b)| note(&mut edges, at(b) - at(a)));
+        }
+        Self { corners: soup.vertices.clone(), normals, edges }
+    }
+
+    fn placed(&self, X_W: &Isometry3<f64>) -> Self {
+        let turned = |ways: &[Vector3<f64>]| ways.iter().map(|way| X_W * way).collect();
+        let corners = self.corners.iter().map(|at| (X_W * Point3::from(*at)).coords).collect();
+        Self { corners, normals: turned(&self.normals), edges: turned(&self.edges) }
+    }
+
+    /// Depth in each other (m): the least overlap along all normals and all that is across two edges.
+    fn depth_m(&self, other: &Self) -> f64 {
+        let across = self.edges.iter().flat_map(|a| other.edges.iter().map(|b| a.cross(b)));
+        let across = across.filter_map(|way| way.try_normalize(1e-9));
+        let ways = self.normals.iter().chain(&other.normals).copied().chain(across);
+        let overlap_m = |way: Vector3<f64>| {
+            let ends = [self, other].map(|one| {
+                let along = one.corners.iter().map(|at| way.dot(at));
+                along.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], at| [low.min(at), high.max(at)])
+            });
+            (ends[0][1] - ends[1][0]).min(ends[1][1] - ends[0][0])
+        };
+        ways.map(overlap_m).fold(f64::INFINITY, f64::min)
+    }
+}
+
+/// One comes down on another that is fixed, as they are turned, 0.1 mm above it; how deep it gets in 0.4 s, and is at the end (m).
+fn depths_m(lower: &TriangleSoup, upper: &TriangleSoup, noise: &mut Noise) -> [f64; 2] {
+    let polytopes = [lower, upper].map(Polytope::of);
+    let X_WA = Isometry3::from_parts(Vector3::zeros().into(), noise.turn());
+    let (aside, turn) = (noise.vector(0.006), noise.turn());
+    let above = |high_m: f64| Isometry3::from_parts(Vector3::new(aside.x, high_m, aside.z).into(), turn);
+    let lower_W = polytopes[0].placed(&X_WA);
+    let depth_m = |X_WB: &Isometry3<f64>| lower_W.depth_m(&polytopes[1].placed(X_WB));
+    // From above, since what is below it may be free again.
+    let (mut low_m, mut high_m) = (-0.3, 0.3);
+    let is_in = |high_m: f64| depth_m(&above(high_m)) > -1e-4;
+    let first = (0..600).map(|at| 0.3 - 1e-3 * f64::from(at)).find(|at| is_in(*at));
+    if let Some(first) = first {
+        (low_m, high_m) = (first, first + 1e-3);
+    }
+    for _ in 0..20 {
+        let middle_m = 0.5 * (low_m + high_m);
+        *(if is_in(middle_m) { &mut low_m } else { &mut high_m }) = middle_m;
+    }
+    let [lower, upper]: [Shape; 2] = [lower, upper].map(|soup| meshes::build(soup.clone()).into());
+    let entities = vec![object(lower, X_WA, 1000.0, 0.5), object(upper, above(high_m), 1000.0, 0.5)];
+    let bodies = [(1, body(&entities[1], 0.05))];
+    let contact_stiffness = ContactStiffness::ByMass { damping_ratio: 1.0 };
+    let mut world = World::new(entities, &bodies, Settings { contact_stiffness, ..Settings::default() }, 0);
+    let mut depths = [f64::NEG_INFINITY; 2];
+    for tick in 0..400 {
+        world.step(&[]);
+        if tick % 4 == 3 {
+            depths[1] = depth_m(&world.entities[1].X_WB);
+            depths[0] = depths[0].max(depths[1]);
+        }
+    }
+    depths
+}
+
+#[test]
+fn sharp_convex_meshes_hardly_get_into_each_other_and_none_lodges() {
+    let sharp = sharp();
+    let noise = &mut Noise::new(7);
+    let (mut all, mut deep) = (0, 0);
+    for (a, lower) in sharp.iter().enumerate() {
+        for (b, upper) in sharp.iter().enumerate() {
+            let [deepest_m, last_m] = depths_m(lower, upper, noise);
+            // What swings down at 1 m/s moves by 1 mm in a tick.
+            assert!(deepest_m < 1e-3, "{a} under {b}: {deepest_m:e} m");
+            assert!(last_m < 1e-4, "{a} under {b}, at the end: {last_m:e} m");
+            (all, deep) = (all + 1, deep + usize::from(deepest_m > 2e-4));
+        }
+    }
+    assert!(all >= 5 * deep, "{deep} of {all}");
+}
