@@ -40,6 +40,7 @@ mod mesh_corner;
 mod mesh_cut;
 mod mesh_found;
 mod mesh_other;
+mod mesh_overlap;
 mod mesh_own;
 mod mesh_patch;
 mod mesh_plane;

@@ -11,9 +11,10 @@
 //! Cost: that of [`follow`] if the direction of the last tick can be followed; otherwise bounded by [`MAX_TURNS`]
 //! searches, mostly one or two.
 
+use haptics::mesh::Mesh;
 use nalgebra::Vector3;
 
-use super::convex::{Convex, Core};
+use super::convex::{Convex, Core, farthest_corner};
 use super::follow::follow;
 use super::gjk::Gap;
 
@@ -41,8 +42,8 @@ const SAME: f64 = 1e-12;
 const NEAR: f64 = 1e-3;
 /// As deep as this share of the smaller inner radius, other ways out are looked at.
 const DEEP: f64 = 0.75;
-/// Faces of a mesh that are looked at as ways out.
-const MOST_FACES: usize = 32;
+/// Of so few faces of a mesh each is looked at.
+const FEW_FACES: usize = 48;
 /// Another way out must be shorter by this.
 const SHORTER: f64 = 0.5;
 
@@ -127,13 +128,13 @@ fn shortest_way_out(a: &Convex<'_>, b: &Convex<'_>) -> Vector3<f64> {
     let mut best_m = separation(a, b, &best);
     for (form, sign) in [(a, -1.0), (b, 1.0)] {
         if let Core::Hull(mesh) = form.core {
-            for face in mesh.faces().iter().step_by(mesh.faces().len().div_ceil(MOST_FACES)) {
-                let normal = form.rotation * (face.normal_B * sign);
+            for_each_way(mesh, |way| {
+                let normal = form.rotation * (way * sign);
                 let gap_m = separation(a, b, &normal);
                 if gap_m > best_m {
                     (best, best_m) = (normal, gap_m);
                 }
-            }
+            });
             continue;
         }
         for axis in 0..3 {
@@ -153,6 +154,18 @@ fn shortest_way_out(a: &Convex<'_>, b: &Convex<'_>) -> Vector3<f64> {
         }
     }
     best
+}
+
+/// Directions in which faces of a convex mesh look: of many, those around what lies farthest out on all sides, and these sides.
+fn for_each_way(mesh: &Mesh, mut visit: impl FnMut(&Vector3<f64>)) {
+    if mesh.faces().len() <= FEW_FACES {
+        return mesh.faces().iter().for_each(|face| visit(&face.normal_B));
+    }
+    for side in (0..27).filter(|side| *side != 13) {
+        let way = Vector3::from([side % 3, side / 3 % 3, side / 9].map(|at| f64::from(at) - 1.0)).normalize();
+        visit(&way);
+        farthest_corner(mesh, &way).for_each_face(mesh, |face| visit(&face.normal_B));
+    }
 }
 
 pub(super) fn unit(v: &Vector3<f64>) -> Option<Vector3<f64>> {

@@ -167,11 +167,15 @@ fn farthest(mesh: &Mesh, d: &Vector3<f64>) -> Vector3<f64> {
         let farther = |most: &'_ Vector3<f64>, at: &Vector3<f64>| d.dot(at) > d.dot(most);
         return vertices.iter().fold(vertices[0], |most, at| if farther(&most, at) { *at } else { most });
     }
+    *farthest_corner(mesh, d).point_M(mesh)
+}
+
+/// The corner of a face of a convex mesh that lies farthest in a direction.
+pub(super) fn farthest_corner(mesh: &Mesh, d: &Vector3<f64>) -> Corner {
     let from = Corner::new(mesh.extreme(d).unwrap_or(0));
     // Over what is flat it does not go on for less.
     let per_step = (STEP * mesh.extent_m() * d.norm()).recip();
-    let (corner, _) = from.climb(mesh, |corner| (d.dot(corner.point_M(mesh)) * per_step).floor());
-    *corner.point_M(mesh)
+    from.climb(mesh, |corner| (d.dot(corner.point_M(mesh)) * per_step).floor()).0
 }
 
 /// What a vertex must be farther by to be the farthest, in extents.

@@ -42,9 +42,9 @@ pub(super) fn follow(
         }
         is_at_face = true;
         let normal = plate.normal;
-        if plate.seen_along(&normal).is_some_and(|view| view.covers(&other.support(&-normal))) {
-            let n = normal * sign;
-            return Some((n, a.support(&-n)));
+        let over = other.support(&-normal);
+        if let Some(view) = plate.seen_along(&normal).filter(|view| view.covers(&over)) {
+            return Some((normal * sign, if sign > 0.0 { over } else { view.onto(&over) }));
         }
     }
     if is_at_face {

@@ -63,6 +63,14 @@ impl Corner {
         !is_closed
     }
 
+    /// Visits the faces around it, of many the first.
+    pub(super) fn for_each_face(self, mesh: &Mesh, mut visit: impl FnMut(&Face)) {
+        let mut fan = Fan::new(mesh, self.0 / 3, (self.0 % 3) as usize);
+        while let Some((face, _)) = fan.next() {
+            visit(&mesh.faces()[face as usize]);
+        }
+    }
+
     /// Whether any face around it looks that way.
     pub(super) fn looks(self, mesh: &Mesh, way_M: &Vector3<f64>) -> bool {
         let mut fan = Fan::new(mesh, self.0 / 3, (self.0 % 3) as usize);

@@ -32,6 +32,7 @@ use super::mesh_corner::Corner;
 use super::mesh_cut::{Edge, WayOut};
 use super::mesh_found::Found;
 use super::mesh_other::{Extent, Meeting, Other, Solidity};
+use super::mesh_overlap;
 use super::mesh_own::Own;
 use super::mesh_patch::{MAX_PATCHES, Patch, Patches};
 use super::mesh_search::look_around;
@@ -76,6 +77,9 @@ pub(super) fn contact_points(
             }
         }
     }
+    if let (None, Solidity::Mesh(second)) = (&touch, other.solid) {
+        part_regions(mesh, second, &other.X_MO, &mut found);
+    }
     found.all().iter().for_each(|contact| told.tell(contact));
     patches.all.iter_mut().enumerate().for_each(|(number, patch)| patch.carried = found.carried(number));
     patches.put_a_pressed_one_first();
@@ -105,6 +109,25 @@ fn find(
         }
     }
     found
+}
+
+/// Of coarse meshes what is in both is pressed apart, where nothing does that yet.
+fn part_regions(mesh: &Mesh, second: &Mesh, X_MO: &Isometry3<f64>, found: &mut Found) {
+    let (regions, count) = mesh_overlap::regions(mesh, second, X_MO);
+    for region in regions[..count].iter().filter(|region| region.depth_m > LITTLE_M) {
+        let agrees = |contact: &Contact| {
+            let is_there = (contact.on_mesh_M - region.on_mesh_M).norm() < region.depth_m + region.radius_m;
+            is_there.then(|| contact.normal_M.dot(&region.normal_M))
+        };
+        found.keep_if(|contact| agrees(contact).is_none_or(|agrees| agrees > AGAINST));
+        let presses = |contact: &Contact| {
+            contact.gap_m < -0.5 * region.depth_m && agrees(contact).is_some_and(|agrees| agrees > ALONG)
+        };
+        if !found.so_far().iter().any(presses) {
+            let (at_M, about) = (region.on_mesh_M, About::Region(region.face));
+            found.push_apart(Contact::new(about, at_M, region.normal_M, -region.depth_m));
+        }
+    }
 }
 
 /// About where they meet: as in the last tick, or else found by going to and fro; `false` where they are far apart.
@@ -419,6 +442,11 @@ impl Place<'_> {
     }
 }
 
+/// Less deep regions are left to what is found otherwise \[m\].
+const LITTLE_M: f64 = 5e-5;
+/// Cosines to a region's way out: of what presses into it, and of what presses along it.
+const AGAINST: f64 = -0.3;
+const ALONG: f64 = 0.6;
 /// A mesh of no more vertices has long edges.
 const COARSE: usize = 16;
 /// From a place among several \[m\].

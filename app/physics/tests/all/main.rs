@@ -47,12 +47,13 @@ mod let_out;
 mod limit_surface;
 mod meshes_bars;
 mod meshes_bumps;
-mod meshes_convex;
+
 mod meshes_floor;
 mod meshes_mass;
 mod meshes_oracle;
 mod meshes_places;
 mod meshes_plane;
+mod meshes_sharp;
 mod meshes_sheets;
 mod meshes_stacks;
 mod no_allocation;

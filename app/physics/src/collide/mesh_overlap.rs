@@ -1,0 +1,275 @@
+//! Where two coarse meshes are in each other, and along which way each such region is left soonest.
+//!
+//! Problem: of sharp meshes with hollows (angles, channels, gears) that are in each other, vertices and edges see ways out that
+//! disagree, or see none: they lodged, or went through.
+//! Model: where surfaces cross they have closed loops in common, a segment for each two triangles. What a region's volume changes by
+//! when the two are moved is the area, as a vector, of the part of the one's surface that is in the other; by Stokes' theorem that
+//! is half the sum of `p x q` over the loop's segments. So it is that across both edges where edges cross, the face's normal where a
+//! corner is behind it, and what lies between where there is more. How deep the two are is how thick the region is along that, through a point within the loop and through its
+//! corners; where there is none, as of a peg that presses floor and walls, it is no single place, and is left out.
+//! Frames: the mesh's frame M; normals from the mesh to the other one.
+//! Limits: meshes of [`MOST_VERTICES`]; of more, vertices lie near each other. Of triangles and segments so many that it is bounded;
+//! beyond, nothing is found.
+//! Cost: one box against box for each two triangles that are near both.
+
+use haptics::mesh::{Mesh, Sides};
+use nalgebra::{Isometry3, Point3, Vector3};
+
+/// A part of the space that is in both.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct Region {
+    pub(super) normal_M: Vector3<f64>,
+    /// Of the mesh, in the middle of the loop \[m\].
+    pub(super) on_mesh_M: Vector3<f64>,
+    pub(super) depth_m: f64,
+    /// All of the loop is so near to that \[m\].
+    pub(super) radius_m: f64,
+    /// One of the mesh's faces.
+    pub(super) face: u32,
+}
+
+/// A piece of a loop.
+#[derive(Debug, Clone, Copy, Default)]
+struct Segment {
+    ends: [Vector3<f64>; 2],
+    faces: [u32; 2],
+    region: usize,
+}
+
+#[derive(Debug, Clone, Copy, Default)]
+struct Triangle {
+    corners: [Vector3<f64>; 3],
+    normal: Vector3<f64>,
+    offset_m: f64,
+    number: u32,
+}
+
+/// Triangles of one that are near the other.
+struct Triangles {
+    all: [Triangle; MOST_TRIANGLES],
+    count: usize,
+}
+
+/// The regions; none if there are too many of anything.
+pub(super) fn regions(mesh: &Mesh, second: &Mesh, X_MO: &Isometry3<f64>) -> ([Region; MOST_REGIONS], usize) {
+    let mut found = ([Region::default(); MOST_REGIONS], 0);
+    let is_coarse = |mesh: &Mesh| mesh.vertices().len() <= MOST_VERTICES && mesh.sides() == Sides::Solid;
+    if !is_coarse(mesh) || !is_coarse(second) {
+        return found;
+    }
+    let mut placed = [Vector3::zeros(); MOST_VERTICES];
+    let vertices = &mut placed[..second.vertices().len()];
+    vertices.iter_mut().zip(second.vertices()).for_each(|(at, own)| *at = (X_MO * Point3::from(*own)).coords);
+    let [low, high] = mesh.bounds_B();
+    let bounds = |points: &[Vector3<f64>]| {
+        points.iter().fold([points[0]; 2], |[low, high], at| [low.inf(at), high.sup(at)])
+    };
+    let [other_low, other_high] = bounds(vertices);
+    let both = [low.sup(&other_low), high.inf(&other_high)];
+    let own = Triangles::of(mesh, mesh.vertices(), &both, |normal| *normal);
+    let others = Triangles::of(second, vertices, &both, |normal| X_MO * normal);
+    let (Some(own), Some(others)) = (own, others) else { return found };
+    let mut segments = [Segment::default(); MOST_SEGMENTS];
+    let mut count = 0;
+    for a in own.as_slice() {
+        for b in others.as_slice() {
+            if let Some(ends) = a.crosses(b) {
+                let Some(segment) = segments.get_mut(count) else { return found };
+                *segment = Segment { ends, faces: [a.number, b.number], region: count };
+                count += 1;
+            }
+        }
+    }
+    let segments = &mut segments[..count];
+    join(segments, SAME * mesh.extent_m().max(second.extent_m()));
+    for first in 0..count {
+        if segments[first].region != first {
+            continue;
+        }
+        if let (Some(place), Some(region)) =
+            (found.0.get_mut(found.1), region(segments, first, mesh, second, X_MO))
+        {
+            *place = region;
+            found.1 += 1;
+        }
+    }
+    found
+}
+
+/// Gives those that hang together one number: that of the first of them.
+fn join(segments: &mut [Segment], near_m: f64) {
+    for at in 1..segments.len() {
+        for before in 0..at {
+            let (a, b) = (segments[at], segments[before]);
+            let shares = a.faces[0] == b.faces[0] || a.faces[1] == b.faces[1];
+            let touches =
+                || a.ends.iter().any(|p| b.ends.iter().any(|q| (p - q).norm_squared() < near_m * near_m));
+            if a.region != b.region && shares && touches() {
+                let (from, to) = (a.region.max(b.region), a.region.min(b.region));
+                segments[..=at].iter_mut().filter(|one| one.region == from).for_each(|one| one.region = to);
+            }
+        }
+    }
+}
+
+fn region(
+    segments: &[Segment],
+    number: usize,
+    mesh: &Mesh,
+    second: &Mesh,
+    X_MO: &Isometry3<f64>,
+) -> Option<Region> {
+    let own = || segments.iter().filter(|segment| segment.region == number);
+    let count = own().count() as f64;
+    let middle = own().flat_map(|segment| segment.ends).sum::<Vector3<f64>>() / (2.0 * count);
+    let area: Vector3<f64> =
+        own().map(|segment| (segment.ends[0] - middle).cross(&(segment.ends[1] - middle)) * 0.5).sum();
+    let radius_m = own().flat_map(|segment| segment.ends).map(|at| (at - middle).norm()).fold(0.0, f64::max);
+    // Of a loop that is not closed, or goes to and fro, it tells nothing.
+    let normal_M = area.try_normalize(LEAST_AREA * radius_m * radius_m)?;
+    let seen = |at: &Vector3<f64>| X_MO.inverse_transform_point(&Point3::from(*at)).coords;
+    let is_in_both = |at: &Vector3<f64>| mesh.is_inside(at) && second.is_inside(&seen(at));
+    // Into the region, on which side of the loop that is.
+    let aside = |at: Vector3<f64>, into: [f64; 2]| into.map(|into| at + normal_M * (into * radius_m));
+    let central = aside(middle, INTO).into_iter().find(is_in_both);
+    let inside = central.or_else(|| {
+        let far_from = |at: Vector3<f64>| {
+            let ends = own().map(|segment| segment.ends[0]);
+            ends.max_by(|a, b| (a - at).norm_squared().total_cmp(&(b - at).norm_squared())).unwrap_or(at)
+        };
+        let across =
+            own().take(MOST_CHORDS).map(|segment| (segment.ends[0] + far_from(segment.ends[0])) * 0.5);
+        aside(middle, FARTHER).into_iter().chain(across.flat_map(|at| aside(at, INTO))).find(is_in_both)
+    })?;
+    let far = normal_M * (2.0 * mesh.extent_m());
+    let out_of_mesh = |at: &Vector3<f64>| Some(mesh.first_crossing(at, &(at + far))?.point_B);
+    let out_of_second = |at: &Vector3<f64>| {
+        let left = second.first_crossing(&seen(at), &seen(&(at - far)))?;
+        Some((X_MO * Point3::from(left.point_B)).coords)
+    };
+    let mut on_mesh_M = out_of_mesh(&inside)?;
+    let mut depth_m = normal_M.dot(&(on_mesh_M - out_of_second(&inside)?));
+    // In a layer along several sides it leads along that.
+    let is_layer = |on_mesh_M: &Vector3<f64>, depth_m: f64| {
+        let halfway = on_mesh_M - normal_M * (0.5 * depth_m);
+        let room_m = mesh.nearest(&halfway).distance_m.min(second.nearest(&seen(&halfway)).distance_m);
+        room_m * THIN < depth_m
+    };
+    if central.is_none() && is_layer(&on_mesh_M, depth_m) {
+        return None;
+    }
+    let mut note = |on_mesh: Option<Vector3<f64>>, on_second: Option<Vector3<f64>>| {
+        let Some((on_mesh, on_second)) = on_mesh.zip(on_second) else { return };
+        let far_m = normal_M.dot(&(on_mesh - on_second));
+        if far_m > depth_m && !is_layer(&on_mesh, far_m) {
+            (on_mesh_M, depth_m) = (on_mesh, far_m);
+        }
+    };
+    let is_near = |at: &Vector3<f64>| (at - middle).norm() < NEAR * radius_m;
+    for segment in own() {
+        for vertex in mesh.faces()[segment.faces[0] as usize].vertices {
+            let at = mesh.vertices()[vertex as usize];
+            if is_near(&at) && second.is_inside(&seen(&at)) {
+                note(Some(at), out_of_second(&at));
+            }
+        }
+        for vertex in second.faces()[segment.faces[1] as usize].vertices {
+            let at = (X_MO * Point3::from(second.vertices()[vertex as usize])).coords;
+            if is_near(&at) && mesh.is_inside(&at) {
+                note(out_of_mesh(&at), Some(at));
+            }
+        }
+    }
+    let face = own().map(|segment| segment.faces[0]).min()?;
+    Some(Region { normal_M, on_mesh_M, depth_m, radius_m, face })
+}
+
+impl Triangles {
+    fn of(
+        mesh: &Mesh,
+        vertices: &[Vector3<f64>],
+        [low, high]: &[Vector3<f64>; 2],
+        turn: impl Fn(&Vector3<f64>) -> Vector3<f64>,
+    ) -> Option<Self> {
+        let mut triangles = Self { all: [Triangle::default(); MOST_TRIANGLES], count: 0 };
+        for (number, face) in mesh.faces().iter().enumerate() {
+            let corners = face.vertices.map(|vertex| vertices[vertex as usize]);
+            let [a, b, c] = &corners;
+            let (least, most) = (a.inf(b).inf(c), a.sup(b).sup(c));
+            if (0..3).any(|axis| least[axis] > high[axis] || most[axis] < low[axis]) {
+                continue;
+            }
+            let normal = turn(&face.normal_B);
+            let offset_m = normal.dot(a);
+            *triangles.all.get_mut(triangles.count)? =
+                Triangle { corners, normal, offset_m, number: number as u32 };
+            triangles.count += 1;
+        }
+        Some(triangles)
+    }
+
+    fn as_slice(&self) -> &[Triangle] {
+        &self.all[..self.count]
+    }
+}
+
+impl Triangle {
+    fn heights_m(&self, other: &Self) -> [f64; 3] {
+        other.corners.map(|corner| self.normal.dot(&corner) - self.offset_m)
+    }
+
+    /// What two have in common, along `own normal x other normal`.
+    fn crosses(&self, other: &Self) -> Option<[Vector3<f64>; 2]> {
+        let heights = [self.heights_m(other), other.heights_m(self)];
+        let is_aside =
+            |heights: &[f64; 3]| heights.iter().all(|at| *at > 0.0) || heights.iter().all(|at| *at <= 0.0);
+        if heights.iter().any(is_aside) {
+            return None;
+        }
+        let along = self.normal.cross(&other.normal);
+        // Where each of them meets the line that their planes have in common.
+        let parts = [(self, &heights[1]), (other, &heights[0])].map(|(triangle, heights)| {
+            let mut ends = [(f64::INFINITY, Vector3::zeros()), (f64::NEG_INFINITY, Vector3::zeros())];
+            for at in 0..3 {
+                let next = (at + 1) % 3;
+                let (from_m, to_m) = (heights[at], heights[next]);
+                if (from_m > 0.0) == (to_m > 0.0) {
+                    continue;
+                }
+                let point = triangle.corners[at]
+                    + (triangle.corners[next] - triangle.corners[at]) * (from_m / (from_m - to_m));
+                let place = along.dot(&point);
+                if place < ends[0].0 {
+                    ends[0] = (place, point);
+                }
+                if place > ends[1].0 {
+                    ends[1] = (place, point);
+                }
+            }
+            ends
+        });
+        let first = if parts[0][0].0 > parts[1][0].0 { parts[0][0] } else { parts[1][0] };
+        let last = if parts[0][1].0 < parts[1][1].0 { parts[0][1] } else { parts[1][1] };
+        (first.0 < last.0).then_some([first.1, last.1])
+    }
+}
+
+/// Of a mesh that is coarse.
+const MOST_VERTICES: usize = 1024;
+/// Of either, near the other.
+const MOST_TRIANGLES: usize = 128;
+const MOST_SEGMENTS: usize = 128;
+pub(super) const MOST_REGIONS: usize = 4;
+/// Ends of segments of one loop are nearer to each other, in extents.
+const SAME: f64 = 1e-9;
+/// Of a loop's area, in squares of its radius.
+const LEAST_AREA: f64 = 1e-3;
+/// So far from a loop, in its radii, is within the region or beside it; and farther.
+const INTO: [f64; 2] = [-0.01, 0.01];
+const FARTHER: [f64; 2] = [-0.2, 0.2];
+/// A region that is so many times as thick as a ball in it is a layer.
+const THIN: f64 = 10.0;
+/// Chords of a loop on which its inside is looked for.
+const MOST_CHORDS: usize = 6;
+/// Corners of a region are not farther from its loop's middle, in the loop's radii.
+const NEAR: f64 = 3.0;
