@@ -9,7 +9,7 @@ use crate::{common, meshes, noise};
 use common::*;
 use haptics::Shape;
 use haptics::mesh::{TriangleSoup, make};
-use nalgebra::{Isometry3, Point3, Vector3};
+use nalgebra::{Isometry3, Point3, UnitQuaternion, Vector3};
 use noise::Noise;
 use physics::{ContactStiffness, Settings};
 
@@ -243,4 +243,58 @@ fn meshes_that_are_nearly_convex_hold_as_convex_ones_do() {
             assert!(last_m < 5e-4 + dent_m, "{dent_m}, at the end: {last_m:e} m");
         }
     }
+}
+
+/// A slab of 1 m by 20 mm, cut into 12288 faces, and a bar of twelve sides with an edge so deep in it, leaning a little.
+#[test]
+fn what_overlaps_a_finely_cut_slab_is_held_by_the_side_that_it_is_at() {
+    let mut slab = make::cuboid([1.0, 0.02, 1.0]);
+    for _ in 0..5 {
+        slab = meshes::cut_in_four(&slab);
+    }
+    let slab: Shape = meshes::build(slab).into();
+    let bar: Shape = meshes::build(frustum(12, 0.01, 1.0, 0.08)).into();
+    for (deep_m, leaning) in [(1e-6, 0.0), (1e-5, 0.1), (3e-4, 0.0), (3e-4, 0.1), (1e-3, 0.05)] {
+        let turn = UnitQuaternion::from_euler_angles(0.0, 0.3, leaning);
+        let at = Isometry3::from_parts(Vector3::new(0.02, 0.02 - deep_m, 0.03).into(), turn);
+        let entities = vec![
+            object(slab.clone(), Isometry3::identity(), 1000.0, 0.5),
+            object(bar.clone(), at, 1000.0, 0.5),
+        ];
+        let bodies = [(1, body(&entities[1], 0.05))];
+        let contact_stiffness = ContactStiffness::ByMass { damping_ratio: 1.0 };
+        let mut world =
+            World::new(entities, &bodies, Settings { contact_stiffness, ..Settings::default() }, 0);
+        for _ in 0..200 {
+            world.step(&[]);
+        }
+        // It may turn to a side, which is 0.34 mm nearer than an edge.
+        let y = world.entities[1].X_WB.translation.y;
+        assert!(y > 0.02 - deep_m - 1e-3, "{deep_m} m, {leaning}: {y} m");
+    }
+}
+
+/// A ball of 1800 faces on a box, and on the same of triangles: it loses what its corners take.
+#[test]
+fn a_ball_of_triangles_rolls_on_a_box_as_on_one_of_triangles() {
+    let size_m = [1.0, 0.02, 1.0];
+    let [radius_m, speed_m_s] = [0.015, 0.3];
+    let ball: Shape = meshes::build(make::uv_sphere(60, 30, radius_m)).into();
+    let boxes: [Shape; 2] =
+        [haptics::Cuboid::new(size_m).unwrap().into(), meshes::build(make::cuboid(size_m)).into()];
+    let speeds = boxes.map(|shape| {
+        let at = Isometry3::translation(-0.1, 0.01 + radius_m, 0.0);
+        let entities =
+            vec![object(shape, Isometry3::identity(), 1000.0, 0.5), object(ball.clone(), at, 1000.0, 0.5)];
+        let (velocity, spin) = (Vector3::x() * speed_m_s, -Vector3::z() * (speed_m_s / radius_m));
+        let bodies = [(1, body(&entities[1], 0.05).moving(velocity, spin))];
+        let contact_stiffness = ContactStiffness::ByMass { damping_ratio: 1.0 };
+        let mut world =
+            World::new(entities, &bodies, Settings { contact_stiffness, ..Settings::default() }, 0);
+        for _ in 0..400 {
+            world.step(&[]);
+        }
+        world.manipulation.bodies()[0].velocity_W.x
+    });
+    assert!(speeds.iter().all(|speed| *speed > 0.6 * speed_m_s), "{speeds:?}");
 }
