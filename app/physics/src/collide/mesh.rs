@@ -171,8 +171,8 @@ pub(super) enum About {
     Other(u32),
     /// An edge of the mesh, or of the other one, that is cut off; which of its places that is.
     Cut { edge: u32, of_mesh: bool, place: u32 },
-    /// Both, where two convex ones touch: at another place, another number, 0 or 1.
-    Both(u32),
+    /// Both, where two convex ones touch.
+    Both,
     /// A part of the space that is in both, by a face of a coarse mesh.
     Region(u32),
 }
@@ -184,8 +184,8 @@ impl About {
             Self::Edge(face, edge) => (face * 3 + edge as u32) << 2 | 1,
             Self::Vertex(vertex) => vertex << 2 | 2,
             Self::Other(point) => point << 2 | 3,
-            Self::Both(place) => ((1 << 27) - 1 - place) << 2 | 3,
-            Self::Region(face) => ((1 << 27) - 3 - face) << 2 | 3,
+            Self::Both => ((1 << 27) - 1) << 2 | 3,
+            Self::Region(face) => ((1 << 27) - 2 - face) << 2 | 3,
             // No ball has any.
             Self::Cut { edge, of_mesh, place } => (edge << 3 | u32::from(of_mesh) << 2 | place) << 2 | 1,
         }

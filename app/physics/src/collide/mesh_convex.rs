@@ -6,7 +6,7 @@
 //! ([`axis`](super::axis)). Of what is found, that counts which presses along it; where nothing is about as deep, the place at
 //! which they touch does. (With others counted, what slid along one face grew deep by another one, and nobody worked for that.)
 //! Frames: the mesh's frame M; normals from the mesh to the other one.
-//! Memory: words 0 to 2 the direction, 3 whether there is one, 4 to 6 the place, 7 its number.
+//! Memory: words 0 to 2 the direction, 3 whether there is one.
 
 use haptics::mesh::Mesh;
 use nalgebra::{Isometry3, Vector3};
@@ -24,7 +24,6 @@ pub(super) struct Touch {
     pub(super) at_M: Vector3<f64>,
     /// Negative where they overlap \[m\].
     pub(super) gap_m: f64,
-    number: u32,
 }
 
 impl Touch {
@@ -35,15 +34,12 @@ impl Touch {
             Solidity::Form(form) => Convex::of(form, &other.X_MO)?,
             Solidity::Mesh(second) => Convex::of_mesh(second, &other.X_MO)?,
         };
-        let [x, y, z, is_known, at_x, at_y, at_z, number] = *words;
+        let [x, y, z, is_known, ..] = *words;
         let last = (is_known == 1.0).then(|| Vector3::new(x, y, z));
         let found = axis::find(&of_other, &of_mesh, last);
         let (normal_M, gap_m) = (found.normal, found.gap_m - of_other.radius_m);
-        let at_M = found.on_a - normal_M * found.gap_m;
-        let is_another = last.is_none() || (at_M - Vector3::new(at_x, at_y, at_z)).norm() > ANOTHER_M;
-        let number = if is_another { 1.0 - number } else { number };
-        *words = [normal_M.x, normal_M.y, normal_M.z, 1.0, at_M.x, at_M.y, at_M.z, number];
-        Some(Self { normal_M, at_M, gap_m, number: u32::from(number > 0.5) })
+        words[..4].copy_from_slice(&[normal_M.x, normal_M.y, normal_M.z, 1.0]);
+        Some(Self { normal_M, at_M: found.on_a - normal_M * found.gap_m, gap_m })
     }
 
     /// True of a contact point that presses along it.
@@ -55,14 +51,12 @@ impl Touch {
     pub(super) fn unless_found(&self, contacts: &[Contact]) -> Option<Contact> {
         let enough_m = self.gap_m + SAME * self.gap_m.abs() + SAME_M;
         let is_found = contacts.iter().any(|contact| contact.gap_m <= enough_m);
-        (!is_found).then(|| Contact::new(About::Both(self.number), self.at_M, self.normal_M, self.gap_m))
+        (!is_found).then(|| Contact::new(About::Both, self.at_M, self.normal_M, self.gap_m))
     }
 }
 
 /// Cosine between directions that are about the same.
 const AGREES: f64 = 0.99;
-/// So far from where they touched in the last tick it is another place \[m\].
-const ANOTHER_M: f64 = 1e-3;
 /// Share of a depth, and a depth \[m\], that makes no difference.
 const SAME: f64 = 0.1;
 const SAME_M: f64 = 1e-7;

@@ -43,15 +43,6 @@ impl Found {
         self.begins[patch..].fill(self.count);
     }
 
-    /// All so far, without those at which this is false.
-    pub(super) fn keep_if(&mut self, counts: impl Fn(&Contact) -> bool) {
-        for at in (0..self.count).rev() {
-            if !counts(&self.contacts[at]) {
-                self.remove(at);
-            }
-        }
-    }
-
     /// Those of all places.
     pub(super) fn so_far(&self) -> &[Contact] {
         &self.contacts[..self.count]
@@ -170,13 +161,11 @@ impl Found {
             if carried { STAYS * gap_m.min(0.0) + gap_m.max(0.0) } else { gap_m }
         };
         let least = (begin..end).max_by(|&a, &b| gap_m(a).total_cmp(&gap_m(b)));
-        least.into_iter().for_each(|least| self.remove(least));
-    }
-
-    fn remove(&mut self, at: usize) {
-        self.contacts.copy_within(at + 1..self.count, at);
-        self.count -= 1;
-        self.begins.iter_mut().filter(|begin| **begin > at).for_each(|begin| *begin -= 1);
+        if let Some(least) = least {
+            self.contacts.copy_within(least + 1..self.count, least);
+            self.count -= 1;
+            self.begins.iter_mut().filter(|begin| **begin > least).for_each(|begin| *begin -= 1);
+        }
     }
 }
 

@@ -5,8 +5,8 @@
 //! Model: where surfaces cross they have closed loops in common, a segment for each two triangles. What a region's volume changes by
 //! when the two are moved is the area, as a vector, of the part of the one's surface that is in the other; by Stokes' theorem that
 //! is half the sum of `p x q` over the loop's segments. So it is that across both edges where edges cross, the face's normal where a
-//! corner is behind it, and what lies between where there is more. How deep the two are is how thick the region is along that, through a point within the loop and through its
-//! corners; where there is none, as of a peg that presses floor and walls, it is no single place, and is left out.
+//! corner is behind it, and what lies between where there is more. How deep the two are is how thick the region is along that, through a point within the loop; where there is
+//! none, as of a peg that presses floor and walls, it is no single place, and is left out.
 //! Frames: the mesh's frame M; normals from the mesh to the other one.
 //! Limits: meshes of [`MOST_VERTICES`]; of more, vertices lie near each other. Of triangles and segments so many that it is bounded;
 //! beyond, nothing is found.
@@ -147,37 +147,14 @@ fn region(
         let left = second.first_crossing(&seen(at), &seen(&(at - far)))?;
         Some((X_MO * Point3::from(left.point_B)).coords)
     };
-    let mut on_mesh_M = out_of_mesh(&inside)?;
-    let mut depth_m = normal_M.dot(&(on_mesh_M - out_of_second(&inside)?));
-    // In a layer along several sides it leads along that.
-    let is_layer = |on_mesh_M: &Vector3<f64>, depth_m: f64| {
+    let on_mesh_M = out_of_mesh(&inside)?;
+    let depth_m = normal_M.dot(&(on_mesh_M - out_of_second(&inside)?));
+    if central.is_none() {
+        // In a layer along several sides it leads along that.
         let halfway = on_mesh_M - normal_M * (0.5 * depth_m);
         let room_m = mesh.nearest(&halfway).distance_m.min(second.nearest(&seen(&halfway)).distance_m);
-        room_m * THIN < depth_m
-    };
-    if central.is_none() && is_layer(&on_mesh_M, depth_m) {
-        return None;
-    }
-    let mut note = |on_mesh: Option<Vector3<f64>>, on_second: Option<Vector3<f64>>| {
-        let Some((on_mesh, on_second)) = on_mesh.zip(on_second) else { return };
-        let far_m = normal_M.dot(&(on_mesh - on_second));
-        if far_m > depth_m && !is_layer(&on_mesh, far_m) {
-            (on_mesh_M, depth_m) = (on_mesh, far_m);
-        }
-    };
-    let is_near = |at: &Vector3<f64>| (at - middle).norm() < NEAR * radius_m;
-    for segment in own() {
-        for vertex in mesh.faces()[segment.faces[0] as usize].vertices {
-            let at = mesh.vertices()[vertex as usize];
-            if is_near(&at) && second.is_inside(&seen(&at)) {
-                note(Some(at), out_of_second(&at));
-            }
-        }
-        for vertex in second.faces()[segment.faces[1] as usize].vertices {
-            let at = (X_MO * Point3::from(second.vertices()[vertex as usize])).coords;
-            if is_near(&at) && mesh.is_inside(&at) {
-                note(out_of_mesh(&at), Some(at));
-            }
+        if room_m * THIN < depth_m {
+            return None;
         }
     }
     let face = own().map(|segment| segment.faces[0]).min()?;
@@ -271,5 +248,3 @@ const FARTHER: [f64; 2] = [-0.2, 0.2];
 const THIN: f64 = 10.0;
 /// Chords of a loop on which its inside is looked for.
 const MOST_CHORDS: usize = 6;
-/// Corners of a region are not farther from its loop's middle, in the loop's radii.
-const NEAR: f64 = 3.0;

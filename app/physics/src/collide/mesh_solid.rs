@@ -119,13 +119,12 @@ fn part_regions(mesh: &Mesh, second: &Mesh, X_MO: &Isometry3<f64>, found: &mut F
             let is_there = (contact.on_mesh_M - region.on_mesh_M).norm() < region.depth_m + region.radius_m;
             is_there.then(|| contact.normal_M.dot(&region.normal_M))
         };
-        found.keep_if(|contact| agrees(contact).is_none_or(|agrees| agrees > AGAINST));
         let presses = |contact: &Contact| {
             contact.gap_m < -0.5 * region.depth_m && agrees(contact).is_some_and(|agrees| agrees > ALONG)
         };
         if !found.so_far().iter().any(presses) {
             let (at_M, about) = (region.on_mesh_M, About::Region(region.face));
-            found.push_apart(Contact::new(about, at_M, region.normal_M, -region.depth_m));
+            found.push_apart(Contact::new(about, at_M, region.normal_M, -region.depth_m.min(PARTED_M)));
         }
     }
 }
@@ -442,10 +441,11 @@ impl Place<'_> {
     }
 }
 
+/// A region counts as no deeper \[m\]: it may be found when it is deep at once, and nothing is to be thrown out of it.
+const PARTED_M: f64 = 3e-4;
 /// Less deep regions are left to what is found otherwise \[m\].
 const LITTLE_M: f64 = 5e-5;
-/// Cosines to a region's way out: of what presses into it, and of what presses along it.
-const AGAINST: f64 = -0.3;
+/// Cosine to a region's way out of what presses along it.
 const ALONG: f64 = 0.6;
 /// A mesh of no more vertices has long edges.
 const COARSE: usize = 16;

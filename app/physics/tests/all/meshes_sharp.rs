@@ -298,3 +298,38 @@ fn a_ball_of_triangles_rolls_on_a_box_as_on_one_of_triangles() {
     });
     assert!(speeds.iter().all(|speed| *speed > 0.6 * speed_m_s), "{speeds:?}");
 }
+
+/// Two angles across each other, one 30 mm deep in the other: loops come and go there.
+#[test]
+fn what_is_deep_in_another_with_hollows_is_not_thrown_out_of_it() {
+    // Cut so that loops of another shape come there at once.
+    let mut soup = Solid::hollow().swap_remove(0).soup;
+    soup.vertices.rotate_left(6);
+    soup.faces =
+        vec![[2, 1, 0], [3, 2, 0], [3, 0, 5], [5, 4, 3], [6, 7, 8], [6, 8, 9], [11, 6, 9], [9, 10, 11]];
+    soup.faces.extend((0..6).flat_map(|a| {
+        let b = (a + 1) % 6;
+        [[a, b, b + 6], [a, b + 6, a + 6]]
+    }));
+    let angle: Shape = meshes::build(soup).into();
+    let lower = Isometry3::from_parts(
+        Vector3::zeros().into(),
+        UnitQuaternion::from_axis_angle(&Vector3::z_axis(), TAU / 8.0),
+    );
+    let turn = lower.rotation * UnitQuaternion::from_axis_angle(&Vector3::y_axis(), TAU / 4.0);
+    for aside in 0..24 {
+        let above = Vector3::y() * (0.011 + 2e-6 * f64::from(aside));
+        let upper = Isometry3::from_parts(above.into(), turn);
+        let entities = [lower, upper].map(|at| object(angle.clone(), at, 1000.0, 0.5)).to_vec();
+        let bodies = [(1, body(&entities[1], 0.05))];
+        let contact_stiffness = ContactStiffness::ByMass { damping_ratio: 1.0 };
+        let mut world =
+            World::new(entities, &bodies, Settings { contact_stiffness, ..Settings::default() }, 0);
+        for tick in 0..100 {
+            world.step(&[]);
+            // Let out at 0.2 m/s, at the end of an arm, and what it falls.
+            let speed_m_s = world.manipulation.bodies()[0].velocity_W.norm();
+            assert!(speed_m_s < 0.6 + 9.81e-3 * f64::from(tick), "{aside} at {tick}: {speed_m_s} m/s");
+        }
+    }
+}
