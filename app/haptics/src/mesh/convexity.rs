@@ -1,4 +1,4 @@
-//! Whether a mesh is convex, and how far its middle is from its faces.
+//! Convexity of a mesh, and the distance of its middle from its faces.
 //!
 //! Model: what is closed, hangs together and turns outward at each edge is convex. Edges of what is flat may turn inward as
 //! rounding has it; that these do not add up to a hollow is looked at along some faces, over which no vertex may lie.
@@ -45,7 +45,7 @@ impl Mesh {
     }
 }
 
-/// What is so far over a face's plane, in extents, is in it: programs that make hulls round them, and leave dents.
+/// Height over a face's plane, in extents, that is none: programs that make hulls round them, and leave dents.
 const ROUNDING: f64 = 1e-5;
 /// Sine of a turn inward that is none.
 const FLAT: f64 = 1e-2;

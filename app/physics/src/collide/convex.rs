@@ -178,7 +178,7 @@ pub(super) fn farthest_corner(mesh: &Mesh, d: &Vector3<f64>) -> Corner {
     from.climb(mesh, |corner| (d.dot(corner.point_M(mesh)) * per_step).floor()).0
 }
 
-/// What a vertex must be farther by to be the farthest, in extents.
+/// By so much a vertex must be farther to be the farthest, in extents.
 const STEP: f64 = 1e-9;
 /// Of so few vertices each is looked at.
 const FEW: usize = 24;

@@ -16,7 +16,7 @@ use super::convex::Convex;
 use super::mesh::{About, Contact};
 use super::mesh_other::{Other, Solidity};
 
-/// Where two convex ones touch.
+/// The place at which two convex ones touch.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Touch {
     pub(super) normal_M: Vector3<f64>,

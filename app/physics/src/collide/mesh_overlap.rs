@@ -1,15 +1,16 @@
-//! Where two coarse meshes are in each other, and along which way each such region is left soonest.
+//! Regions that two coarse meshes have in common, and the way along which each is left soonest.
 //!
 //! Problem: of sharp meshes with hollows (angles, channels, gears) that are in each other, vertices and edges see ways out that
 //! disagree, or see none: they lodged, or went through.
-//! Model: where surfaces cross they have closed loops in common, a segment for each two triangles. What a region's volume changes by
-//! when the two are moved is the area, as a vector, of the part of the one's surface that is in the other; by Stokes' theorem that
-//! is half the sum of `p x q` over the loop's segments. So it is that across both edges where edges cross, the face's normal where a
-//! corner is behind it, and what lies between where there is more. How deep the two are is how thick the region is along that, through a point within the loop; where there is
-//! none, as of a peg that presses floor and walls, it is no single place, and is left out.
+//! Model: surfaces that cross have closed loops in common, with a segment for each two triangles. When the two are moved, a
+//! region's volume changes by the area, as a vector, of that part of the one's surface which is in the other; by Stokes' theorem
+//! that is half the sum of `p x q` over the loop's segments. So it is that across both edges where edges cross, the face's normal
+//! where a corner is behind it, and a mean of these where there is more. The two are as deep as the region is thick along that,
+//! through a point within the loop; where there is none, as of a peg that presses floor and walls, it is no single place, and is
+//! left out.
 //! Frames: the mesh's frame M; normals from the mesh to the other one.
-//! Limits: meshes of [`MOST_VERTICES`]; of more, vertices lie near each other. Of triangles and segments so many that it is bounded;
-//! beyond, nothing is found.
+//! Limits: meshes of [`MOST_VERTICES`]; of more, vertices lie near each other. Of more triangles or segments than there is room for,
+//! nothing is found.
 //! Cost: one box against box for each two triangles that are near both.
 
 use haptics::mesh::{Mesh, Sides};
@@ -195,7 +196,7 @@ impl Triangle {
         other.corners.map(|corner| self.normal.dot(&corner) - self.offset_m)
     }
 
-    /// What two have in common, along `own normal x other normal`.
+    /// The segment that two have in common, along `own normal x other normal`.
     fn crosses(&self, other: &Self) -> Option<[Vector3<f64>; 2]> {
         let heights = [self.heights_m(other), other.heights_m(self)];
         let is_aside =

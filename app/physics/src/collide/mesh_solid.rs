@@ -12,7 +12,8 @@
 //! would be as deep as it is far from the edge that stands there, and come and go with micrometres.
 //! Frames: the mesh's frame M; normals from the mesh to the other one.
 //! Of all that is found, what [carries](super::mesh_carry) counts.
-//! Two convex ones meet in one place, whose plane is that along which they touch ([`mesh_convex`](super::mesh_convex)).
+//! Two convex ones meet in one place, whose plane is that along which they touch ([`mesh_convex`](super::mesh_convex)). Coarse ones
+//! that are in each other all the same are parted ([`mesh_overlap`](super::mesh_overlap)).
 //! Limits: six places a pair. Crossings are found of a box's edges, of the lines along which cylinders, cones and capsules
 //! touch, and of sharp or long edges that leave the vertices of a mesh that were chosen, as far as these go straight on; where
 //! they bend, vertices lie as near. Rims of round forms are not cut off. An ellipsoid touches with one point: a flat one that tumbles comes down on its
@@ -415,7 +416,7 @@ impl Place<'_> {
         });
     }
 
-    /// Where two convex ones touch, if nothing else presses there.
+    /// The place at which two convex ones touch, if nothing else presses there.
     fn touch(&mut self) {
         let contact = self.touch.and_then(|touch| touch.unless_found(self.found.own()));
         contact.into_iter().for_each(|contact| self.found.push_apart(contact));

@@ -50,7 +50,7 @@ fn sharp() -> Vec<TriangleSoup> {
     ]
 }
 
-/// What a convex solid's overlap with another is measured along.
+/// Directions along which a convex solid's overlap with another is measured.
 struct Polytope {
     corners: Vec<Vector3<f64>>,
     normals: Vec<Vector3<f64>>,
