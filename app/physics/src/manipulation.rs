@@ -126,10 +126,12 @@ impl Manipulation {
     }
 
     fn of(entities: &[Entity], bodies: &[(usize, Body)], settings: Settings) -> Self {
-        for (number, entity) in entities.iter().enumerate() {
-            let may_move = || bodies.iter().any(|(body, _)| *body == number);
+        // Contacts ask for them of each body, and of what is convex.
+        let movable = bodies.iter().map(|(entity, _)| (&entities[*entity], true));
+        let touched = entities.iter().filter(|_| !bodies.is_empty()).map(|entity| (entity, false));
+        for (entity, is_body) in movable.chain(touched) {
             if let Shape::Mesh(mesh) = &entity.shape
-                && (may_move() || !bodies.is_empty() && mesh.convex_inner_m().is_some())
+                && (is_body || mesh.convex_inner_m().is_some())
             {
                 mesh.find_extremes();
             }

@@ -9,7 +9,7 @@
 //! Invariants: n has unit length; continuous where the pose is, as long as the depth is less than the inner radius of
 //! either.
 //! Cost: that of [`follow`] if the direction of the last tick can be followed; otherwise bounded by [`MAX_TURNS`]
-//! searches, mostly one or two.
+//! searches, mostly one or two; where a mesh is deeper than [`DEEP`] allows, some hundred farthest points besides.
 
 use haptics::mesh::Mesh;
 use nalgebra::Vector3;
@@ -121,7 +121,7 @@ fn ascend(a: &Convex<'_>, b: &Convex<'_>, mut normal: Vector3<f64>, room_m: f64)
     }
 }
 
-/// Of the directions in which faces look, and that between the origins, the one with the largest gap.
+/// Of the directions in which faces look, and that between the middles, the one with the largest gap.
 fn shortest_way_out(a: &Convex<'_>, b: &Convex<'_>) -> Vector3<f64> {
     let between = a.middle() - b.middle();
     let mut best = unit(&between).unwrap_or_else(Vector3::y);

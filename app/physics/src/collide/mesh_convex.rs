@@ -15,13 +15,14 @@ use super::axis;
 use super::convex::Convex;
 use super::mesh::{About, Contact};
 use super::mesh_other::{Other, Solidity};
+use super::mesh_patch::Patches;
 
 /// The place at which two convex ones touch.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Touch {
-    pub(super) normal_M: Vector3<f64>,
+    normal_M: Vector3<f64>,
     /// On the mesh \[m\].
-    pub(super) at_M: Vector3<f64>,
+    at_M: Vector3<f64>,
     /// Negative where they overlap \[m\].
     pub(super) gap_m: f64,
 }
@@ -40,6 +41,15 @@ impl Touch {
         let (normal_M, gap_m) = (found.normal, found.gap_m - of_other.radius_m);
         words[..4].copy_from_slice(&[normal_M.x, normal_M.y, normal_M.z, 1.0]);
         Some(Self { normal_M, at_M: found.on_a - normal_M * found.gap_m, gap_m })
+    }
+
+    /// The only place of the two.
+    pub(super) fn settle(&self, patches: &mut Patches) {
+        patches.searched = None;
+        patches.all[1..].iter_mut().for_each(|patch| patch.is_known = false);
+        let first = &mut patches.all[0];
+        (first.normal_M, first.at_M, first.depth_m) = (self.normal_M, self.at_M, (-self.gap_m).max(0.0));
+        first.is_known = true;
     }
 
     /// True of a contact point that presses along it.

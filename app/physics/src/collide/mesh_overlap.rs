@@ -16,17 +16,20 @@
 use haptics::mesh::{Mesh, Sides};
 use nalgebra::{Isometry3, Point3, Vector3};
 
+use super::mesh::{About, Contact};
+use super::mesh_found::Found;
+
 /// A part of the space that is in both.
 #[derive(Debug, Clone, Copy, Default)]
-pub(super) struct Region {
-    pub(super) normal_M: Vector3<f64>,
+struct Region {
+    normal_M: Vector3<f64>,
     /// Of the mesh, in the middle of the loop \[m\].
-    pub(super) on_mesh_M: Vector3<f64>,
-    pub(super) depth_m: f64,
+    on_mesh_M: Vector3<f64>,
+    depth_m: f64,
     /// All of the loop is so near to that \[m\].
-    pub(super) radius_m: f64,
+    radius_m: f64,
     /// One of the mesh's faces.
-    pub(super) face: u32,
+    face: u32,
 }
 
 /// A piece of a loop.
@@ -51,8 +54,26 @@ struct Triangles {
     count: usize,
 }
 
+/// Presses apart what is in both of two coarse meshes, where nothing does that yet.
+pub(super) fn part(mesh: &Mesh, second: &Mesh, X_MO: &Isometry3<f64>, found: &mut Found) {
+    let (regions, count) = regions(mesh, second, X_MO);
+    for region in regions[..count].iter().filter(|region| region.depth_m > LITTLE_M) {
+        let agrees = |contact: &Contact| {
+            let is_there = (contact.on_mesh_M - region.on_mesh_M).norm() < region.depth_m + region.radius_m;
+            is_there.then(|| contact.normal_M.dot(&region.normal_M))
+        };
+        let presses = |contact: &Contact| {
+            contact.gap_m < -0.5 * region.depth_m && agrees(contact).is_some_and(|agrees| agrees > ALONG)
+        };
+        if !found.so_far().iter().any(presses) {
+            let (at_M, about) = (region.on_mesh_M, About::Region(region.face));
+            found.push_apart(Contact::new(about, at_M, region.normal_M, -region.depth_m.min(PARTED_M)));
+        }
+    }
+}
+
 /// The regions; none if there are too many of anything.
-pub(super) fn regions(mesh: &Mesh, second: &Mesh, X_MO: &Isometry3<f64>) -> ([Region; MOST_REGIONS], usize) {
+fn regions(mesh: &Mesh, second: &Mesh, X_MO: &Isometry3<f64>) -> ([Region; MOST_REGIONS], usize) {
     let mut found = ([Region::default(); MOST_REGIONS], 0);
     let is_coarse = |mesh: &Mesh| mesh.vertices().len() <= MOST_VERTICES && mesh.sides() == Sides::Solid;
     if !is_coarse(mesh) || !is_coarse(second) {
@@ -232,12 +253,18 @@ impl Triangle {
     }
 }
 
+/// A region counts as no deeper \[m\]: it may be found when it is deep at once, and nothing is to be thrown out of it.
+const PARTED_M: f64 = 3e-4;
+/// Less deep regions are left to what is found otherwise \[m\].
+const LITTLE_M: f64 = 5e-5;
+/// Cosine to a region's way out of what presses along it.
+const ALONG: f64 = 0.6;
 /// Of a mesh that is coarse.
 const MOST_VERTICES: usize = 1024;
 /// Of either, near the other.
 const MOST_TRIANGLES: usize = 128;
 const MOST_SEGMENTS: usize = 128;
-pub(super) const MOST_REGIONS: usize = 4;
+const MOST_REGIONS: usize = 4;
 /// Ends of segments of one loop are nearer to each other, in extents.
 const SAME: f64 = 1e-9;
 /// Of a loop's area, in squares of its radius.

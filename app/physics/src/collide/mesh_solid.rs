@@ -62,7 +62,7 @@ pub(super) fn contact_points(
     }
     let was_pressed = patches.are_pressed();
     if let Some(touch) = &touch {
-        patches.meet_at(touch);
+        touch.settle(patches);
     } else {
         look_around(mesh, other, reach_m, travel_m, patches);
     }
@@ -79,7 +79,7 @@ pub(super) fn contact_points(
         }
     }
     if let (None, Solidity::Mesh(second)) = (&touch, other.solid) {
-        part_regions(mesh, second, &other.X_MO, &mut found);
+        mesh_overlap::part(mesh, second, &other.X_MO, &mut found);
     }
     found.all().iter().for_each(|contact| told.tell(contact));
     patches.all.iter_mut().enumerate().for_each(|(number, patch)| patch.carried = found.carried(number));
@@ -110,24 +110,6 @@ fn find(
         }
     }
     found
-}
-
-/// Of coarse meshes what is in both is pressed apart, where nothing does that yet.
-fn part_regions(mesh: &Mesh, second: &Mesh, X_MO: &Isometry3<f64>, found: &mut Found) {
-    let (regions, count) = mesh_overlap::regions(mesh, second, X_MO);
-    for region in regions[..count].iter().filter(|region| region.depth_m > LITTLE_M) {
-        let agrees = |contact: &Contact| {
-            let is_there = (contact.on_mesh_M - region.on_mesh_M).norm() < region.depth_m + region.radius_m;
-            is_there.then(|| contact.normal_M.dot(&region.normal_M))
-        };
-        let presses = |contact: &Contact| {
-            contact.gap_m < -0.5 * region.depth_m && agrees(contact).is_some_and(|agrees| agrees > ALONG)
-        };
-        if !found.so_far().iter().any(presses) {
-            let (at_M, about) = (region.on_mesh_M, About::Region(region.face));
-            found.push_apart(Contact::new(about, at_M, region.normal_M, -region.depth_m.min(PARTED_M)));
-        }
-    }
 }
 
 /// About where they meet: as in the last tick, or else found by going to and fro; `false` where they are far apart.
@@ -186,17 +168,6 @@ fn lowest(mesh: &Mesh, other: &Other<'_>, at_M: &Vector3<f64>) -> Option<(Seen, 
     let point_M = other.lowest(&normal_M)?;
     let seen = see(mesh, &point_M, &normal_M, 0.0);
     Some((seen, point_M - seen.out * seen.gap_m))
-}
-
-impl Patches {
-    /// The only place of two convex ones.
-    fn meet_at(&mut self, touch: &Touch) {
-        self.searched = None;
-        self.all[1..].iter_mut().for_each(|patch| patch.is_known = false);
-        let first = &mut self.all[0];
-        (first.normal_M, first.at_M, first.depth_m) = (touch.normal_M, touch.at_M, (-touch.gap_m).max(0.0));
-        first.is_known = true;
-    }
 }
 
 impl Patch {
@@ -442,12 +413,6 @@ impl Place<'_> {
     }
 }
 
-/// A region counts as no deeper \[m\]: it may be found when it is deep at once, and nothing is to be thrown out of it.
-const PARTED_M: f64 = 3e-4;
-/// Less deep regions are left to what is found otherwise \[m\].
-const LITTLE_M: f64 = 5e-5;
-/// Cosine to a region's way out of what presses along it.
-const ALONG: f64 = 0.6;
 /// A mesh of no more vertices has long edges.
 const COARSE: usize = 16;
 /// From a place among several \[m\].
