@@ -7,10 +7,10 @@ fn inner_m(soup: TriangleSoup) -> Option<f64> {
     Mesh::build(soup).unwrap().0.convex_inner_m()
 }
 
-/// Sixteen squares a side, each vertex moved out by this share, by the way to it from the middle.
-fn cut_cube(moved: impl Fn(&Vector3<f64>) -> f64) -> TriangleSoup {
+/// Cut in four so often, each vertex moved out by this share, by the way to it from the middle.
+fn cut_cube(often: usize, moved: impl Fn(&Vector3<f64>) -> f64) -> TriangleSoup {
     let mut soup = make::cuboid([0.1; 3]);
-    for _ in 0..4 {
+    for _ in 0..often {
         soup = cut_in_four(&soup);
     }
     for vertex in &mut soup.vertices {
@@ -37,11 +37,15 @@ fn convex_solids_are_told_with_the_ball_that_is_in_them() {
     let ball = inner_m(make::uv_sphere(64, 32, 0.05)).unwrap();
     // The middles of its faces lie within by half the square of an angle.
     assert!((0.0497..0.05).contains(&ball), "{ball}");
-    // Seven digits, as files have them.
-    let flat = inner_m(cut_cube(|_| 0.0)).unwrap();
+    let flat = inner_m(cut_cube(4, |_| 0.0)).unwrap();
     assert!((flat - 0.05).abs() < 1e-15, "{flat}");
-    let mut written = cut_cube(|_| 0.0);
-    written.vertices.iter_mut().for_each(|vertex| *vertex = vertex.map(|part| f64::from(part as f32)));
+    // Seven digits, as files have them.
+    let turn = nalgebra::UnitQuaternion::from_euler_angles(0.3, 0.5, 0.7);
+    let mut written = cut_cube(4, |_| 0.0);
+    written
+        .vertices
+        .iter_mut()
+        .for_each(|vertex| *vertex = (turn * *vertex).map(|part| f64::from(part as f32)));
     assert!(inner_m(written).is_some());
 }
 
@@ -54,9 +58,28 @@ fn what_is_hollow_anywhere_or_consists_of_parts_is_not_convex() {
     // Dents of a tenth of a millimetre, and of a hundredth.
     for deep in [1e-3, 1e-4] {
         let dented =
-            cut_cube(|way| if way.y > 0.8 { -deep * (1.0 - (1.0 - way.y) / 0.2).max(0.0) } else { 0.0 });
+            cut_cube(4, |way| if way.y > 0.8 { -deep * (1.0 - (1.0 - way.y) / 0.2).max(0.0) } else { 0.0 });
         assert_eq!(inner_m(dented), None, "{deep}");
     }
+    // One vertex of many, which few faces see.
+    let mut pressed = cut_cube(6, |_| 0.0);
+    let top = Vector3::y() * 0.05;
+    pressed.vertices.iter_mut().filter(|at| (**at - top).norm() < 1e-9).for_each(|at| at.y -= 1e-4);
+    assert_eq!(inner_m(pressed), None);
+    // A dish of 50 m radius, cut so finely that no edge tells: 25 um deep.
+    let mut dish = cut_cube(6, |_| 0.0);
+    for at in dish.vertices.iter_mut().filter(|at| at.y > 0.049_999) {
+        at.y -= (0.005 - at.x * at.x - at.z * at.z) / 100.0;
+    }
+    assert_eq!(inner_m(dish), None);
+    // Two parts, of which one is so small that hardly a face of the other looks at it.
+    let mut ball = make::uv_sphere(400, 200, 0.05);
+    let first = ball.vertices.len() as u32;
+    let grain = make::cuboid([2e-6; 3]);
+    let place = Vector3::new(1.0, 2.0, 3.0).normalize() * 0.050_003;
+    ball.vertices.extend(grain.vertices.iter().map(|vertex| vertex + place));
+    ball.faces.extend(grain.faces.iter().map(|face| face.map(|vertex| vertex + first)));
+    assert_eq!(inner_m(ball), None);
     let mut two = make::cuboid([0.1; 3]);
     let first = two.vertices.len() as u32;
     let other = make::cuboid([0.1; 3]);

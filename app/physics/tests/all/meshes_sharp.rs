@@ -7,11 +7,11 @@ use std::f64::consts::TAU;
 use crate::{common, meshes, noise};
 
 use common::*;
-use haptics::Shape;
 use haptics::mesh::{TriangleSoup, make};
+use haptics::{Entity, Shape};
 use nalgebra::{Isometry3, Point3, UnitQuaternion, Vector3};
 use noise::Noise;
-use physics::{ContactStiffness, Settings};
+use physics::{Body, ContactStiffness, Settings};
 
 /// From a base over x and y with so many corners to a top of this share of it.
 fn frustum(sides: u32, radius_m: f64, top: f64, length_m: f64) -> TriangleSoup {
@@ -158,6 +158,14 @@ fn depth_m(solids: [&Solid; 2], poses: [&Isometry3<f64>; 2]) -> f64 {
     all.fold(f64::NEG_INFINITY, f64::max)
 }
 
+/// One that may move, at a fixed one.
+fn world([lower, upper]: [Entity; 2], moving: impl Fn(Body) -> Body) -> World {
+    let entities = vec![lower, upper];
+    let bodies = [(1, moving(body(&entities[1], 0.05)))];
+    let contact_stiffness = ContactStiffness::ByMass { damping_ratio: 1.0 };
+    World::new(entities, &bodies, Settings { contact_stiffness, ..Settings::default() }, 0)
+}
+
 /// One comes down on another that is fixed, as they are turned, 0.1 mm above it; how deep it gets in 0.4 s, and is at the end (m).
 fn depths_m(solids: [&Solid; 2], noise: &mut Noise) -> [f64; 2] {
     let X_WA = Isometry3::from_parts(Vector3::zeros().into(), noise.turn());
@@ -176,10 +184,8 @@ fn depths_m(solids: [&Solid; 2], noise: &mut Noise) -> [f64; 2] {
         *(if is_in(middle_m) { &mut low_m } else { &mut high_m }) = middle_m;
     }
     let [lower, upper]: [Shape; 2] = solids.map(|solid| meshes::build(solid.soup.clone()).into());
-    let entities = vec![object(lower, X_WA, 1000.0, 0.5), object(upper, above(high_m), 1000.0, 0.5)];
-    let bodies = [(1, body(&entities[1], 0.05))];
-    let contact_stiffness = ContactStiffness::ByMass { damping_ratio: 1.0 };
-    let mut world = World::new(entities, &bodies, Settings { contact_stiffness, ..Settings::default() }, 0);
+    let entities = [object(lower, X_WA, 1000.0, 0.5), object(upper, above(high_m), 1000.0, 0.5)];
+    let mut world = world(entities, |body| body);
     let mut depths = [f64::NEG_INFINITY; 2];
     for tick in 0..400 {
         world.step(&[]);
@@ -257,14 +263,8 @@ fn what_overlaps_a_finely_cut_slab_is_held_by_the_side_that_it_is_at() {
     for (deep_m, leaning) in [(1e-6, 0.0), (1e-5, 0.1), (3e-4, 0.0), (3e-4, 0.1), (1e-3, 0.05)] {
         let turn = UnitQuaternion::from_euler_angles(0.0, 0.3, leaning);
         let at = Isometry3::from_parts(Vector3::new(0.02, 0.02 - deep_m, 0.03).into(), turn);
-        let entities = vec![
-            object(slab.clone(), Isometry3::identity(), 1000.0, 0.5),
-            object(bar.clone(), at, 1000.0, 0.5),
-        ];
-        let bodies = [(1, body(&entities[1], 0.05))];
-        let contact_stiffness = ContactStiffness::ByMass { damping_ratio: 1.0 };
-        let mut world =
-            World::new(entities, &bodies, Settings { contact_stiffness, ..Settings::default() }, 0);
+        let lower = object(slab.clone(), Isometry3::identity(), 1000.0, 0.5);
+        let mut world = world([lower, object(bar.clone(), at, 1000.0, 0.5)], |body| body);
         for _ in 0..200 {
             world.step(&[]);
         }
@@ -284,13 +284,10 @@ fn a_ball_of_triangles_rolls_on_a_box_as_on_one_of_triangles() {
         [haptics::Cuboid::new(size_m).unwrap().into(), meshes::build(make::cuboid(size_m)).into()];
     let speeds = boxes.map(|shape| {
         let at = Isometry3::translation(-0.1, 0.01 + radius_m, 0.0);
-        let entities =
-            vec![object(shape, Isometry3::identity(), 1000.0, 0.5), object(ball.clone(), at, 1000.0, 0.5)];
+        let lower = object(shape, Isometry3::identity(), 1000.0, 0.5);
         let (velocity, spin) = (Vector3::x() * speed_m_s, -Vector3::z() * (speed_m_s / radius_m));
-        let bodies = [(1, body(&entities[1], 0.05).moving(velocity, spin))];
-        let contact_stiffness = ContactStiffness::ByMass { damping_ratio: 1.0 };
         let mut world =
-            World::new(entities, &bodies, Settings { contact_stiffness, ..Settings::default() }, 0);
+            world([lower, object(ball.clone(), at, 1000.0, 0.5)], |body| body.moving(velocity, spin));
         for _ in 0..400 {
             world.step(&[]);
         }
@@ -320,11 +317,8 @@ fn what_is_deep_in_another_with_hollows_is_not_thrown_out_of_it() {
     for aside in 0..24 {
         let above = Vector3::y() * (0.011 + 2e-6 * f64::from(aside));
         let upper = Isometry3::from_parts(above.into(), turn);
-        let entities = [lower, upper].map(|at| object(angle.clone(), at, 1000.0, 0.5)).to_vec();
-        let bodies = [(1, body(&entities[1], 0.05))];
-        let contact_stiffness = ContactStiffness::ByMass { damping_ratio: 1.0 };
-        let mut world =
-            World::new(entities, &bodies, Settings { contact_stiffness, ..Settings::default() }, 0);
+        let entities = [lower, upper].map(|at| object(angle.clone(), at, 1000.0, 0.5));
+        let mut world = world(entities, |body| body);
         for tick in 0..100 {
             world.step(&[]);
             // Let out at 0.2 m/s, at the end of an arm, and what it falls.
