@@ -11,6 +11,7 @@ use crate::control::queue::OrderReceiver;
 use crate::control::{Control, OrderTally};
 use crate::displaced::Displaced;
 use crate::fast_step::{EventTeller, FastStep};
+use crate::room_supply::RoomSupply;
 use crate::row::{BodyRow, Row};
 use crate::row_queue::RowSender;
 use bytemuck::Zeroable;
@@ -47,6 +48,8 @@ pub enum Turn {
 /// The fast thread's state.
 pub struct FastLoop {
     step: FastStep,
+    /// More room for its contacts, when it needs that.
+    supply: RoomSupply,
     /// What people change meanwhile, if anybody may.
     control: Option<Control>,
     /// Finds what happens, and where that is told, if anybody wants to know.
@@ -141,6 +144,7 @@ impl FastLoop {
             teller: EventTeller::new(&mut step),
             displaced: Displaced::new(step.entities().len()),
             step,
+            supply: RoomSupply::default(),
             control: None,
             events: None,
             is_first_scene: true,
@@ -172,6 +176,13 @@ impl FastLoop {
     #[must_use]
     pub fn with_carriage(mut self, carriage: Carriage) -> Self {
         self.control = self.control.map(|control| control.with_carriage(carriage));
+        self
+    }
+
+    /// With room from somewhere else, where its ticks have deadlines.
+    #[must_use]
+    pub fn with_supply(mut self, supply: RoomSupply) -> Self {
+        self.supply = supply;
         self
     }
 
@@ -279,6 +290,7 @@ impl FastLoop {
         self.step.meet_driver(driver.abi_minor(), driver.ramp_in_ticks());
         self.step.step(&self.frame, &mut self.command, &mut self.row);
         commander.publish(&self.command, driver);
+        self.supply.serve(&mut self.step);
     }
 
     /// Not before t = 0: until then a scene is what it says.

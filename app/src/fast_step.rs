@@ -38,7 +38,7 @@ use haptics::{Door, Effects, Entity, Field, FingerEffects, Guide, Hip, Moment, P
 use last_line::{LastLine, Line};
 use nalgebra::Vector3;
 use near::Near;
-use physics::{Body, BodyError, Manipulation};
+use physics::{Body, BodyError, Manipulation, Room, Wanted};
 use shm_abi::MAX_DEVICES;
 use shm_abi::frame::DEVICE_POSITION_VALID;
 use shm_abi::{Command, Frame};
@@ -196,6 +196,21 @@ impl FastStep {
     /// Whether there was more at a finger's place in the last tick than it has room for.
     pub fn is_crowded(&self) -> bool {
         self.near.iter().any(Near::is_crowded)
+    }
+
+    /// Room for contacts between entities that it should get before long ([`Manipulation::wanted_room`]).
+    pub fn wanted_room(&self) -> Option<Wanted> {
+        self.objects.manipulation.wanted_room()
+    }
+
+    /// Takes it ([`Manipulation::take_room`]).
+    pub fn take_room(&mut self, room: Room) -> Room {
+        self.objects.manipulation.take_room(room, &self.entities)
+    }
+
+    /// Makes and takes it, where a tick has no deadline.
+    pub fn make_room(&mut self) {
+        self.objects.manipulation.make_room(&self.entities);
     }
 
     /// Number of times that contacts between entities had no room so far, in the fast list.

@@ -48,6 +48,7 @@ pub mod recording;
 pub mod replay;
 pub mod report;
 pub mod rig;
+pub mod room_supply;
 pub mod row;
 pub mod row_queue;
 pub mod run;

@@ -16,6 +16,7 @@ use crate::not_zeroed;
 use crate::outcome::{RunFailure, Stop, no_thread};
 use crate::premises::{OtherDriver, Premises};
 use crate::progress::Progress;
+use crate::room_supply::RoomSupply;
 use crate::slow::SlowSide;
 use crate::slow_thread::SlowThread;
 use io_driver::say::say;
@@ -111,6 +112,9 @@ pub fn run(
     let mut fast = fast;
     let run_ticks = Arc::<AtomicU64>::default();
     let slow_list = start_slow_list(&mut fast, later, &attachment.driver, &run_ticks)?;
+    if attachment.driver.info().clock_mode == ClockMode::Real {
+        fast = fast.with_supply(RoomSupply::start().map_err(|error| no_thread("room for contacts", &error))?);
+    }
     loop {
         // In lockstep ticks wait for replies instead.
         let is_real = attachment.driver.info().clock_mode == ClockMode::Real;

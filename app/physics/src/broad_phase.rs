@@ -31,6 +31,11 @@ pub struct BroadPhase {
 
 /// A box is larger than its entity by this on each side \[m\].
 const FAT_M: f64 = 5e-3;
+/// By as much as it moves in so many ticks, and if that is within the limits by no more than this \[m\]: a long box is near
+/// much that its entity never meets.
+const AHEAD_M: f64 = 10e-3;
+const LEAST_TICKS_AHEAD: f64 = 3.0;
+const MOST_TICKS_AHEAD: f64 = 16.0;
 
 impl BroadPhase {
     /// Where the entities are now.
@@ -43,11 +48,28 @@ impl BroadPhase {
         Self { tree, leaves, boundless, version: 0 }
     }
 
-    /// Takes note of an entity that moved, and will soon have gone on by so much (m). Says whether its box changed.
-    pub fn moved(&mut self, index: usize, entity: &Entity, ahead_W: &Vector3<f64>) -> bool {
+    /// Takes note of an entity that moved by itself, and will move so much (m) in the next tick: it is in its box then, too.
+    /// Says whether that changed.
+    pub fn moved(&mut self, index: usize, entity: &Entity, way_W: &Vector3<f64>) -> bool {
+        let ticks = (AHEAD_M / way_W.norm()).clamp(LEAST_TICKS_AHEAD, MOST_TICKS_AHEAD);
+        self.changed(index, entity, way_W, &(way_W * ticks))
+    }
+
+    /// Takes note of an entity that was put somewhere else, and will be moved by this (m). Says whether its box changed.
+    pub fn was_put(&mut self, index: usize, entity: &Entity, ahead_W: &Vector3<f64>) -> bool {
+        self.changed(index, entity, &Vector3::zeros(), ahead_W)
+    }
+
+    fn changed(
+        &mut self,
+        index: usize,
+        entity: &Entity,
+        least_W: &Vector3<f64>,
+        ahead_W: &Vector3<f64>,
+    ) -> bool {
         let Some(Some(leaf)) = self.leaves.get(index).copied() else { return false };
         let Some(tight) = Aabb::of_entity(entity) else { return false };
-        if self.tree.around(leaf).contains(&tight) {
+        if self.tree.around(leaf).contains(&tight.swept(least_W)) {
             return false;
         }
         self.tree.remove(leaf);

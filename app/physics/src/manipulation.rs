@@ -14,10 +14,12 @@ mod ordered;
 mod parcel;
 mod pressing;
 mod rest;
+mod room;
 
 pub use driven::MAX_DRIVEN;
 pub use made::{Made, Parked, Reason};
 pub use parcel::Parcel;
+pub use room::{Room, Wanted};
 
 use arrival::Arrival;
 use departure::Departure;
@@ -33,17 +35,14 @@ use crate::contacts::Contacts;
 use crate::error::BodyError;
 use crate::hand::{FingerSettings, FingerTick, Hand};
 use crate::integrator::Gets;
-use crate::integrator::explicit::Kept;
-use crate::integrator::rk4::Stages;
 use crate::pairs::{Pairs, Who};
 use crate::pull::{MAX_PULLS, Pull};
-use crate::restitution::Restitution;
 use crate::roster::Roster;
-use crate::row::Row;
 use crate::settings::Settings;
 use crate::sleep::Sets;
-use crate::solver::{Motion, Solved, Solver};
+use crate::solver::{Motion, Solved};
 use crate::touch::Touch;
+use room::{RowCounts, RowRoom};
 
 /// All bodies, and what they remember of where they touch. There is no copy of one: it would not have its room.
 #[derive(Debug)]
@@ -57,23 +56,23 @@ pub struct Manipulation {
     bodies: Vec<Body>,
     /// Of each of them, which entity it is.
     entities: Vec<usize>,
-    rows: Vec<Row>,
+    /// Contact points, and all that has a place for each of them.
+    room: Box<RowRoom>,
+    /// What becomes [`Self::room`] in the next tick, and what was that.
+    next_room: Option<Box<RowRoom>>,
+    used_room: Option<Box<RowRoom>>,
     motions: Vec<Motion>,
     /// By how much each of them changes its motion in the tick without contacts.
     changes: Vec<Motion>,
     speeds_m_s: Vec<f64>,
     /// Of each body, what a tick took from it \[J\].
     spare_j: Vec<f64>,
-    solver: Solver,
     hand: Hand,
-    restitution: Restitution,
     sets: Sets,
     /// The first so many rows are fingers', and the first so many of these press or hold.
     touching: usize,
     pressing: usize,
     gets: Vec<Gets>,
-    stages: Stages,
-    fixed: Vec<Kept>,
     parked: Vec<Parked>,
     ticks: u64,
     /// What is on its way to here.
@@ -97,15 +96,13 @@ pub struct Manipulation {
 
 /// The most touches of fingers in a tick.
 const MAX_TOUCHES: usize = 64;
-/// The most contact points between entities in a tick, or so many of each body if that is more; others are left out, and
-/// counted. A quarter is for those with what does not move: nothing falls through a floor for want of room.
-const MAX_ROWS: usize = 8192;
+/// Contact points between entities that have room at first, or so many of each body if that is more; until there is
+/// [more](room) others are left out, and counted. A quarter is for those with what does not move: nothing falls through a floor
+/// for want of room.
+const ROWS: usize = 8192;
 const ROWS_OF_BODY: usize = 8;
-/// The box of a body is longer by the way of so many ticks than it need be.
-const TICKS_AHEAD: f64 = 16.0;
-/// The most pairs of entities that are near each other, or so many of each body if that is more; others are left out, and
-/// counted, and a quarter is for those with what does not move.
-const MAX_PAIRS: usize = 4096;
+/// Pairs of entities near each other that have room at first, or so many of each body if that is more, likewise.
+const PAIRS: usize = 4096;
 const PAIRS_OF_BODY: usize = 3;
 
 impl Manipulation {
@@ -138,36 +135,39 @@ impl Manipulation {
         }
         let count = bodies.len();
         let places = count + MAX_DRIVEN;
-        let pairs = count.saturating_mul(entities.len()).min(MAX_PAIRS.max(PAIRS_OF_BODY * count));
-        let rows = MAX_ROWS.max(ROWS_OF_BODY * count);
-        let room = (pairs * MAX_POINTS).min(rows) + MAX_TOUCHES + MAX_PULLS;
+        let most_pairs = count.saturating_mul(entities.len());
+        let pairs = most_pairs.min(PAIRS.max(PAIRS_OF_BODY * count));
+        let pairs = Pairs::with_capacity(pairs, most_pairs);
+        let rows = RowCounts {
+            of_pairs: (pairs.room() * MAX_POINTS).min(ROWS.max(ROWS_OF_BODY * count)),
+            of_fingers: MAX_TOUCHES + MAX_PULLS,
+            bodies: count,
+        };
         let heaviest_kg = bodies.iter().map(|(_, body)| body.mass.mass_kg).fold(0.0, f64::max);
         let mut made = Self {
             settings,
             contacts: settings.contacts(heaviest_kg),
             roster: Roster::new(entities.len(), bodies),
             broad_phase: BroadPhase::new(entities),
-            pairs: Pairs::with_capacity(pairs),
             bodies: Vec::with_capacity(places),
             entities: Vec::with_capacity(places),
-            rows: Vec::with_capacity(room),
+            room: Box::new(RowRoom::new(rows)),
+            next_room: None,
+            used_room: None,
             motions: Vec::with_capacity(places),
             changes: Vec::with_capacity(places),
             speeds_m_s: Vec::with_capacity(places),
             spare_j: Vec::with_capacity(places),
-            solver: Solver::with_capacity(room, places),
             hand: Hand::new(&[], count),
-            restitution: Restitution::with_capacity(room, places),
             sets: Sets::with_capacity(count),
             touching: 0,
             pressing: 0,
             gets: Vec::with_capacity(places),
-            stages: Stages::with_capacity(room, places),
-            fixed: Vec::with_capacity(room),
             parked: Vec::with_capacity(count),
             ticks: 0,
-            arrival: Arrival::with_capacity(count, pairs),
-            departure: Departure::with_capacity(count, pairs),
+            arrival: Arrival::with_capacity(count, pairs.room()),
+            departure: Departure::with_capacity(count, pairs.room()),
+            pairs,
             is_marked: vec![false; count].into(),
             last_anchors: Default::default(),
             neighbours: Vec::with_capacity(count),
@@ -180,6 +180,7 @@ impl Manipulation {
             let who = who(&made.roster, entities, made.contacts);
             made.pairs.meet(body, &who, &made.broad_phase, true);
         }
+        made.make_room(entities);
         made
     }
 
@@ -189,13 +190,8 @@ impl Manipulation {
     pub fn with_fingers(mut self, fingers: &[FingerSettings]) -> Self {
         let bodies = self.roster.bodies.len();
         self.hand = Hand::new(fingers, bodies);
-        let room = self.rows.capacity() + self.hand.most_rows();
-        let places = bodies + MAX_DRIVEN;
-        self.rows = Vec::with_capacity(room);
-        self.solver = Solver::with_capacity(room, places);
-        self.stages = Stages::with_capacity(room, places);
-        self.restitution = Restitution::with_capacity(room, places);
-        self.fixed = Vec::with_capacity(room);
+        let of_fingers = self.room.counts.of_fingers + self.hand.most_rows();
+        self.room = Box::new(RowRoom::new(RowCounts { of_fingers, ..self.room.counts }));
         self
     }
 
@@ -252,7 +248,7 @@ impl Manipulation {
         let Solved { sweeps, residual, unsolved } = self.find_forces(dt_s);
         for (touch, row) in touches.iter_mut().zip(touch_rows) {
             if let Some(row) = row {
-                touch.force_on_user_W = -self.rows[row].force_W;
+                touch.force_on_user_W = -self.room.rows[row].force_W;
             }
         }
         for (at, pull) in pulls.iter_mut().enumerate() {
@@ -260,17 +256,17 @@ impl Manipulation {
             let body = self.body_of(pull.entity);
             if body.is_none_or(|body| !self.roster.standing(body).is_away()) {
                 let row = pull_rows.get(at).copied().flatten();
-                pull.force_on_user_W = row.map_or(Vector3::zeros(), |row| -self.rows[row].force_W);
+                pull.force_on_user_W = row.map_or(Vector3::zeros(), |row| -self.room.rows[row].force_W);
             }
         }
-        self.hand.settle(&self.rows, &self.motions, &self.roster, fingers, dt_s);
+        self.hand.settle(&self.room.rows, &self.motions, &self.roster, fingers, dt_s);
         self.sum_up();
         self.settle_pairs(entities, dt_s);
         let (awake, parked) = (self.roster.awake().len(), self.advance(entities, dt_s));
         self.advance_driven(entities);
         self.keep_up(entities, dt_s);
         self.rest(entities, touches, dt_s);
-        Made { rows: self.rows.len(), sweeps, residual, unsolved, parked, awake }
+        Made { rows: self.room.rows.len(), sweeps, residual, unsolved, parked, awake }
     }
 }
 

@@ -273,6 +273,11 @@ impl Pair {
         self.is_new = true;
     }
 
+    /// Whether it had rows in the last tick.
+    pub(crate) fn touches(&self) -> bool {
+        self.rows > 0
+    }
+
     /// Its rows of the last tick.
     pub(crate) fn rows<'r>(&self, rows: &'r [Row]) -> &'r [Row] {
         rows.get(self.first_row..self.first_row + self.rows).unwrap_or_default()

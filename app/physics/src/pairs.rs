@@ -4,10 +4,15 @@
 //! remembers of where they touch until they do not any more. Pairs without a body that is awake are kept apart: nobody looks
 //! at them until one is woken.
 //! Invariants: of two bodies there is one pair, whose first is the one of the lower number; pairs are gone through in
-//! ascending order; no allocation after `with_capacity`. Where there is no room for one more it is left out, and counted.
+//! ascending order; no allocation after `with_capacity`. Where there is no room for one more it is left out, counted,
+//! and begun when [there is more](Pairs::take).
 //! What has ended is not cleared: who begins in its place overwrites what is read.
 
+mod pool;
+
 use haptics::{Entity, Shape};
+
+use pool::{Chunk, Pool};
 
 use crate::broad_phase::BroadPhase;
 use crate::contacts::Contacts;
@@ -16,14 +21,40 @@ use crate::pair::{Head, Pair, Surfacing};
 /// Pairs, and which bodies and entities they are of.
 #[derive(Debug, Clone)]
 pub(crate) struct Pairs {
-    pool: Box<[Pair]>,
+    pool: Pool,
     unused: Vec<u32>,
     /// Those with a body that is awake.
     awake: Vec<Key>,
     /// The others.
     asleep: Vec<Key>,
-    /// How many were left out for want of room.
+    /// Room for those that begin in a tick.
+    fresh: Vec<Key>,
+    /// How many were left out for want of room, in a tick in which they were missing.
     pub(crate) left_out: u64,
+    /// How many more will be, if there is no room before the next one.
+    pub(crate) missing: u64,
+    /// Whether any were since there was more room.
+    lacks_some: bool,
+    /// There are no more of them in the world.
+    most: usize,
+}
+
+/// Room for more pairs than there were.
+#[derive(Debug)]
+pub(crate) struct MorePairs {
+    chunks: Vec<Chunk>,
+    unused: Vec<u32>,
+    awake: Vec<Key>,
+    asleep: Vec<Key>,
+    fresh: Vec<Key>,
+}
+
+impl MorePairs {
+    /// More by so many, for `pairs` in all.
+    pub(crate) fn new(more: usize, pairs: usize) -> Self {
+        let [awake, asleep, fresh] = [(); 3].map(|()| Vec::with_capacity(pairs));
+        Self { chunks: pool::chunks(more), unused: Vec::with_capacity(pairs), awake, asleep, fresh }
+    }
 }
 
 /// A pair, in the order in which they are gone through.
@@ -59,14 +90,50 @@ pub(crate) struct Who<'w> {
 }
 
 impl Pairs {
-    pub(crate) fn with_capacity(pairs: usize) -> Self {
+    /// Room for so many, and there will never be more than `most`.
+    pub(crate) fn with_capacity(pairs: usize, most: usize) -> Self {
+        let pool = Pool::new(pool::chunks(pairs));
+        let pairs = pool.len();
         Self {
-            pool: vec![Pair::default(); pairs].into(),
             unused: (0..pairs as u32).rev().collect(),
             awake: Vec::with_capacity(pairs),
             asleep: Vec::with_capacity(pairs),
+            fresh: Vec::with_capacity(pairs),
             left_out: 0,
+            missing: 0,
+            lacks_some: false,
+            most: most.min(pool::MOST),
+            pool,
         }
+    }
+
+    /// How many have room.
+    pub(crate) fn room(&self) -> usize {
+        self.pool.len()
+    }
+
+    /// How many should have room, if that is more than have: twice as many as are used.
+    pub(crate) fn wanted(&self) -> Option<usize> {
+        let room = self.pool.len();
+        (room < self.most && 2 * self.unused.len() < room)
+            .then(|| (2 * room).min(self.most).next_multiple_of(pool::CHUNK))
+    }
+
+    /// Takes more room; what it replaces is left behind. Says whether pairs are missing, which then have to be begun.
+    pub(crate) fn take(&mut self, more: &mut MorePairs) -> bool {
+        let begin = self.pool.len() as u32;
+        self.pool.add(&mut more.chunks);
+        more.unused.clear();
+        more.unused.extend((begin..self.pool.len() as u32).rev());
+        more.unused.extend_from_slice(&self.unused);
+        std::mem::swap(&mut self.unused, &mut more.unused);
+        std::mem::swap(&mut self.fresh, &mut more.fresh);
+        for (own, more) in [(&mut self.awake, &mut more.awake), (&mut self.asleep, &mut more.asleep)] {
+            more.extend_from_slice(own);
+            std::mem::swap(own, more);
+        }
+        self.missing = 0;
+        std::mem::take(&mut self.lacks_some)
     }
 
     /// How many have a body that is awake.
@@ -77,7 +144,7 @@ impl Pairs {
     /// One of them, in order.
     pub(crate) fn awake_at(&mut self, at: usize) -> (Key, &mut Pair) {
         let key = self.awake[at];
-        (key, &mut self.pool[key.place as usize])
+        (key, &mut self.pool[key.place])
     }
 
     /// Takes note whether one of them is near enough to touch.
@@ -87,7 +154,7 @@ impl Pairs {
 
     /// One that is known by its key, wherever that is.
     pub(crate) fn of_key(&self, key: &Key) -> &Pair {
-        &self.pool[key.place as usize]
+        &self.pool[key.place]
     }
 
     /// The keys of all pairs, those without an awake body last.
@@ -112,31 +179,18 @@ impl Pairs {
 
     /// Those that have a body that is awake, in order.
     pub(crate) fn iter_awake(&self) -> impl Iterator<Item = (Key, &Pair)> {
-        self.awake.iter().map(|key| (*key, &self.pool[key.place as usize]))
+        self.awake.iter().map(|key| (*key, &self.pool[key.place]))
     }
 
     /// All pairs, those without an awake body last.
     pub(crate) fn iter(&self) -> impl Iterator<Item = (Key, &Pair)> {
-        self.awake.iter().chain(&self.asleep).map(|key| (*key, &self.pool[key.place as usize]))
+        self.awake.iter().chain(&self.asleep).map(|key| (*key, &self.pool[key.place]))
     }
 
     /// Begins and ends pairs of a body whose box has changed. Whether somebody has put it where it is, or what it meets there.
     pub(crate) fn follow(&mut self, body: usize, who: &Who<'_>, broad_phase: &BroadPhase, was_put: bool) {
         let own = who.entities[body];
-        let overlap = |key: &Key| {
-            let boxes = [who.entities[key.body as usize], key.entity as usize]
-                .map(|entity| broad_phase.around(entity));
-            matches!(boxes, [Some(one), Some(other)] if one.overlaps(other)) || boxes.contains(&None)
-        };
-        let is_of_body = |key: &Key| key.body as usize == body || key.entity as usize == own;
-        let unused = &mut self.unused;
-        self.awake.retain(|key| {
-            let stays = !is_of_body(key) || overlap(key);
-            if !stays {
-                unused.push(key.place);
-            }
-            stays
-        });
+        self.end_apart(who, broad_phase, |key| key.body as usize == body || key.entity as usize == own);
         self.meet(body, who, broad_phase, was_put);
     }
 
@@ -152,13 +206,65 @@ impl Pairs {
         self.unused.extend(self.awake.drain(..).chain(self.asleep.drain(..)).map(|key| key.place));
     }
 
+    /// As [`Self::follow`], of all bodies that have moved by themselves, which are marked.
+    pub(crate) fn follow_all(
+        &mut self,
+        moved: &[u32],
+        is_moved: &[bool],
+        who: &Who<'_>,
+        broad_phase: &BroadPhase,
+    ) {
+        let has_moved = |entity: usize| who.bodies[entity].is_some_and(|body| is_moved[body as usize]);
+        self.end_apart(who, broad_phase, |key| is_moved[key.body as usize] || has_moved(key.entity as usize));
+        let mut fresh = std::mem::take(&mut self.fresh);
+        for body in moved.iter().map(|&body| body as usize) {
+            let Some(around) = broad_phase.around(who.entities[body]) else { continue };
+            broad_phase.near(around, |entity| {
+                // Of two that have moved the first one finds the other.
+                let is_found = who.bodies[entity].is_some_and(|other| (other as usize) < body);
+                if !(is_found && has_moved(entity))
+                    && let Some((_, key)) = self.begun(body, entity, who, false)
+                {
+                    fresh.push(key);
+                }
+            });
+        }
+        merge(&mut self.awake, &mut fresh);
+        self.fresh = fresh;
+    }
+
+    /// Ends those whose boxes do not overlap any more, among these; what touched in this tick ends later.
+    fn end_apart(&mut self, who: &Who<'_>, broad_phase: &BroadPhase, among: impl Fn(&Key) -> bool) {
+        let overlap = |key: &Key| {
+            let boxes = [who.entities[key.body as usize], key.entity as usize]
+                .map(|entity| broad_phase.around(entity));
+            matches!(boxes, [Some(one), Some(other)] if one.overlaps(other)) || boxes.contains(&None)
+        };
+        let Self { unused, pool, .. } = self;
+        self.awake.retain(|key| {
+            // Whoever touched in this tick is still asked what it did.
+            let stays = !among(key) || overlap(key) || pool[key.place].touches();
+            if !stays {
+                unused.push(key.place);
+            }
+            stays
+        });
+    }
+
     fn begin(&mut self, body: usize, entity: usize, who: &Who<'_>, was_put: bool) {
+        if let Some((at, key)) = self.begun(body, entity, who, was_put) {
+            self.awake.insert(at, key);
+        }
+    }
+
+    /// A pair that is missing, and where it belongs among those awake.
+    fn begun(&mut self, body: usize, entity: usize, who: &Who<'_>, was_put: bool) -> Option<(usize, Key)> {
         let own = who.entities[body];
         let other = who.bodies[entity].map(|other| other as usize);
         let (one, two) = (&who.all[own], &who.all[entity]);
         let meet = one.is_collidable && two.is_collidable && one.space == two.space;
         if other == Some(body) || !meet {
-            return;
+            return None;
         }
         let [first, second] = match other {
             Some(other) if other < body => [other, own],
@@ -167,21 +273,22 @@ impl Pairs {
         let at = |keys: &[Key]| {
             keys.binary_search_by_key(&(first, second), |key| (key.body as usize, key.entity as usize))
         };
-        let Err(place_in_order) = at(&self.awake) else { return };
+        let place_in_order = at(&self.awake).err()?;
         if at(&self.asleep).is_ok() {
-            return;
+            return None;
         }
         let is_full = other.is_some() && self.unused.len() <= self.pool.len() / 4;
         let Some(place) = self.unused.pop_if(|_| !is_full) else {
-            self.left_out += 1;
-            return;
+            self.missing += 1;
+            self.lacks_some = true;
+            return None;
         };
         let entities = [who.entities[first], second];
         let both = entities.map(|entity| &who.all[entity]);
         let surfacing = Surfacing::between(both[0], both[1], &who.contacts);
         let has_mesh = both.iter().any(|entity| matches!(entity.shape, Shape::Mesh(_)));
-        self.pool[place as usize].begin(entities, has_mesh, surfacing, was_put);
-        self.awake.insert(place_in_order, Key::new([first as u32, second as u32], true, place));
+        self.pool[place].begin(entities, has_mesh, surfacing, was_put);
+        Some((place_in_order, Key::new([first as u32, second as u32], true, place)))
     }
 
     /// Takes up the pairs of a body that was woken, and begins those that are missing.
@@ -216,17 +323,17 @@ impl Pairs {
     /// Begins a pair as it was elsewhere, in none of the lists: `None` where there is no room.
     pub(crate) fn begin_as(&mut self, head: &Head) -> Option<u32> {
         let Some(place) = self.unused.pop() else {
-            self.left_out += 1;
+            self.missing += 1;
             return None;
         };
-        self.pool[place as usize].begin_as(head);
+        self.pool[place].begin_as(head);
         Some(place)
     }
 
     /// What the surface of an entity makes of those that it meets is another thing now.
     pub(crate) fn resurface(&mut self, entity: usize, who: &Who<'_>) {
         for key in self.awake.iter().chain(&self.asleep) {
-            let pair = &mut self.pool[key.place as usize];
+            let pair = &mut self.pool[key.place];
             if pair.entities.contains(&entity) {
                 pair.resurface(who);
             }
@@ -236,7 +343,7 @@ impl Pairs {
     /// An entity was put somewhere else by somebody.
     pub(crate) fn was_put(&mut self, entity: usize) {
         for key in self.awake.iter().chain(&self.asleep) {
-            let pair = &mut self.pool[key.place as usize];
+            let pair = &mut self.pool[key.place];
             if pair.entities.contains(&entity) {
                 pair.was_put();
             }
@@ -245,7 +352,7 @@ impl Pairs {
 
     /// One that was [begun](Self::begin_as) there.
     pub(crate) fn at_place(&mut self, place: u32) -> &mut Pair {
-        &mut self.pool[place as usize]
+        &mut self.pool[place]
     }
 
     /// Puts pairs into the lists that were [begun](Self::begin_as) apart; one that is there already becomes what comes.
@@ -262,7 +369,7 @@ impl Pairs {
                 }
             }
             // Whoever sent it may not know yet what is known here.
-            self.pool[key.place as usize].resurface(who);
+            self.pool[key.place].resurface(who);
             let keys = if is_awake { &mut self.awake } else { &mut self.asleep };
             if let Err(at) = at(keys) {
                 keys.insert(at, *key);
@@ -324,5 +431,24 @@ impl Pairs {
     /// Ends one that was [taken out](Self::take_out).
     pub(crate) fn end(&mut self, key: &Key) {
         self.unused.push(key.place);
+    }
+}
+
+/// Puts keys into others that are in order; none is in both.
+fn merge(keys: &mut Vec<Key>, fresh: &mut Vec<Key>) {
+    fresh.sort_unstable();
+    let mut at = keys.len() + fresh.len();
+    let mut old = keys.len();
+    keys.extend_from_slice(fresh);
+    // From behind, so that each has its place.
+    while let Some(&new) = fresh.last() {
+        at -= 1;
+        if old > 0 && keys[old - 1] > new {
+            old -= 1;
+            keys[at] = keys[old];
+        } else {
+            keys[at] = new;
+            fresh.pop();
+        }
     }
 }

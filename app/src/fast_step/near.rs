@@ -282,7 +282,7 @@ mod tests {
         let mut near = Near::new(11);
         assert_eq!(near.update((&broad_phase, &entities), (0, &slots(11)), &at(0.05), &at(0.05), 0.0), [0]);
         entities[10].move_to(Isometry3::translation(0.05, 0.03, 0.0));
-        broad_phase.moved(10, &entities[10], &Vector3::zeros());
+        broad_phase.was_put(10, &entities[10], &Vector3::zeros());
         assert_eq!(
             near.update((&broad_phase, &entities), (0, &slots(11)), &at(0.05), &at(0.05), 0.0),
             [0, 10]

@@ -146,8 +146,26 @@ pub enum ModelError {
     #[error("found no free-form surface in it; allowed: at least one")]
     NoPatch,
     /// There is nothing to touch in it.
-    #[error("found no triangle in it; allowed: at least one")]
-    NoTriangle,
+    #[error("found no triangle in it{}; allowed: at least one", only_points(*.points))]
+    NoTriangle {
+        /// What there is instead.
+        points: usize,
+    },
+}
+
+fn only_points(points: usize) -> String {
+    match points {
+        0 => String::new(),
+        1 => ", only a point, which has no surface".into(),
+        _ => format!(
+            ", only {points} points, which have no surface until a program for meshes makes one through them"
+        ),
+    }
+}
+
+/// A soup with something to touch.
+fn with_triangles(soup: TriangleSoup) -> Result<TriangleSoup, ModelError> {
+    if soup.faces.is_empty() { Err(ModelError::NoTriangle { points: soup.vertices.len() }) } else { Ok(soup) }
 }
 
 /// Names of the kinds of files that are read, for messages.

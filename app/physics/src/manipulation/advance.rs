@@ -3,7 +3,7 @@
 use haptics::Entity;
 use nalgebra::Vector3;
 
-use super::{Manipulation, Parked, Reason, TICKS_AHEAD, who};
+use super::{Manipulation, Parked, Reason, who};
 use crate::body::Body;
 use crate::integrator::Limits;
 use crate::roster::Standing;
@@ -40,13 +40,20 @@ impl Manipulation {
 
     /// Finds who is near whom now.
     pub(super) fn keep_up(&mut self, entities: &[Entity], dt_s: f64) {
-        for &body in self.roster.awake() {
-            let entity = self.roster.entities[body];
-            let ahead_W = self.roster.bodies[body].velocity_W * (dt_s * TICKS_AHEAD);
-            if self.broad_phase.moved(entity, &entities[entity], &ahead_W) {
-                let who = who(&self.roster, entities, self.contacts);
-                self.pairs.follow(body, &who, &self.broad_phase, false);
+        let Self { broad_phase, roster, neighbours, is_marked, .. } = self;
+        neighbours.clear();
+        for &body in roster.awake() {
+            let entity = roster.entities[body];
+            let way_W = roster.bodies[body].velocity_W * dt_s;
+            if broad_phase.moved(entity, &entities[entity], &way_W) {
+                neighbours.push(body as u32);
+                is_marked[body] = true;
             }
+        }
+        let who = who(roster, entities, self.contacts);
+        self.pairs.follow_all(neighbours, is_marked, &who, broad_phase);
+        for &body in &*neighbours {
+            is_marked[body as usize] = false;
         }
     }
 }

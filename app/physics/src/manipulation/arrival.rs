@@ -26,6 +26,12 @@ impl Arrival {
     pub(super) fn with_capacity(bodies: usize, pairs: usize) -> Self {
         Self { bodies: Vec::with_capacity(bodies), keys: Vec::with_capacity(pairs), pair: None }
     }
+
+    /// Goes on with this room, which is larger; what it had is left there.
+    pub(super) fn move_to(&mut self, keys: &mut Vec<Key>) {
+        keys.extend_from_slice(&self.keys);
+        std::mem::swap(&mut self.keys, keys);
+    }
 }
 
 impl Manipulation {

@@ -45,6 +45,12 @@ impl Departure {
             next: Next::Head,
         }
     }
+
+    /// Goes on with this room, which is larger; what it had is left there.
+    pub(super) fn move_to(&mut self, keys: &mut Vec<Key>) {
+        keys.extend_from_slice(&self.keys);
+        std::mem::swap(&mut self.keys, keys);
+    }
 }
 
 impl Manipulation {

@@ -8,8 +8,8 @@
 use haptics::Entity;
 use nalgebra::{Isometry3, Matrix3, UnitQuaternion, Vector3};
 
+use super::Manipulation;
 use super::ordered::at_rest;
-use super::{Manipulation, TICKS_AHEAD};
 use crate::body::Body;
 use crate::mass::MassProperties;
 use crate::pair::fastest_point_m_s;
@@ -98,7 +98,7 @@ impl Manipulation {
                 self.roster.bodies[body] = at_rest(&self.roster.bodies[body], &to_W);
                 self.note_change(body);
             }
-            if self.broad_phase.moved(entity, &entities[entity], &(way_W * TICKS_AHEAD))
+            if self.broad_phase.moved(entity, &entities[entity], &way_W)
                 && let Some(around) = self.broad_phase.around(entity).copied()
             {
                 self.greet(&around, entities, false);

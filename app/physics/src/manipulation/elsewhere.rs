@@ -54,7 +54,7 @@ impl Manipulation {
     /// not on its way any more.
     pub fn was_moved(&mut self, entity: usize, entities: &[Entity]) {
         self.driven.retain(|driven| driven.entity != entity);
-        self.broad_phase.moved(entity, &entities[entity], &Vector3::zeros());
+        self.broad_phase.was_put(entity, &entities[entity], &Vector3::zeros());
         self.pairs.was_put(entity);
         let Some(around) = self.broad_phase.around(entity).copied() else { return };
         self.neighbours.clear();
@@ -72,7 +72,7 @@ impl Manipulation {
         self.roster.bodies[body] = *state;
         self.note_change(body);
         entities[entity].move_to(state.pose());
-        if self.broad_phase.moved(entity, &entities[entity], &(state.velocity_W * ahead_s))
+        if self.broad_phase.was_put(entity, &entities[entity], &(state.velocity_W * ahead_s))
             && let Some(around) = self.broad_phase.around(entity).copied()
         {
             self.greet(&around, entities, true);

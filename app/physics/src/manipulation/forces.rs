@@ -18,33 +18,40 @@ impl Manipulation {
         self.gets[self.roster.awake().len()..].iter_mut().for_each(|gets| gets.is_fixed = true);
         // Impulses are always solved for.
         let springs = match self.settings.response {
-            Response::Force | Response::Bounce { .. } => self.rows.len(),
+            Response::Force | Response::Bounce { .. } => self.room.rows.len(),
             Response::Impulse { .. } => self.touching,
         };
         match self.settings.integrator {
             Integrator::Implicit => {}
             Integrator::Rk4 => {
-                self.stages.run(&self.bodies, &self.rows, self.touching, springs, &mut self.gets, dt_s);
+                self.room.stages.run(
+                    &self.bodies,
+                    &self.room.rows,
+                    self.touching,
+                    springs,
+                    &mut self.gets,
+                    dt_s,
+                );
                 for at in 0..springs {
-                    let (force_W, torque_nm) = self.stages.means(at);
-                    explicit::fix(&mut self.rows, at, &force_W, torque_nm, &mut self.fixed);
+                    let (force_W, torque_nm) = self.room.stages.means(at);
+                    explicit::fix(&mut self.room.rows, at, &force_W, torque_nm, &mut self.room.fixed);
                 }
             }
             Integrator::ThesisEuler | Integrator::ThesisEulerGyroscopic | Integrator::ThesisEulerPrinted => {
                 for at in 0..springs {
                     let (force_W, torque_nm) =
-                        explicit::at_start(&self.rows[at], &self.bodies, at < self.touching, dt_s);
-                    explicit::fix(&mut self.rows, at, &force_W, torque_nm, &mut self.fixed);
+                        explicit::at_start(&self.room.rows[at], &self.bodies, at < self.touching, dt_s);
+                    explicit::fix(&mut self.room.rows, at, &force_W, torque_nm, &mut self.room.fixed);
                 }
             }
         }
-        let solved = self.restitution.solve(
-            &mut self.solver,
-            &mut self.rows,
+        let solved = self.room.restitution.solve(
+            &mut self.room.solver,
+            &mut self.room.rows,
             (&mut self.motions, &self.changes),
             (&self.settings.gravity_W, dt_s),
         );
-        explicit::release(&mut self.rows, &mut self.fixed);
+        explicit::release(&mut self.room.rows, &mut self.room.fixed);
         solved
     }
 
@@ -56,12 +63,12 @@ impl Manipulation {
         for (spare_j, &body) in self.spare_j.iter_mut().zip(self.roster.awake()) {
             *spare_j -= self.roster.owed_j[body];
         }
-        let end = End { rows: &self.rows, motions: &self.motions, entities, dt_s };
+        let end = End { rows: &self.room.rows, motions: &self.motions, entities, dt_s };
         for at in 0..self.pairs.awake_count() {
             self.pairs.awake_at(at).1.take_impulses(&end, &mut self.spare_j);
         }
         for at in 0..self.pairs.awake_count() {
-            let has_met = |row| self.restitution.has_met(row);
+            let has_met = |row| self.room.restitution.has_met(row);
             self.pairs.awake_at(at).1.settle(&end, has_met, &mut self.spare_j);
         }
         for place in 0..self.roster.awake().len() {
@@ -73,7 +80,7 @@ impl Manipulation {
     /// What each body gets: the Residual Force and Torque Algorithms.
     pub(super) fn sum_up(&mut self) {
         self.gets.iter_mut().for_each(|gets| gets.is_free = true);
-        for row in &self.rows {
+        for row in &self.room.rows {
             let torque_W = row.torque_W();
             let sides = [(Some(row.body), 1.0), (row.other, -1.0)];
             for ((body, sign), arm_W) in sides.into_iter().zip(&row.arms_W) {

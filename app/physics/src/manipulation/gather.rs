@@ -51,14 +51,15 @@ impl Manipulation {
         fingers: &[FingerTick],
         dt_s: f64,
     ) -> ([Option<usize>; MAX_TOUCHES], [Option<usize>; MAX_PULLS]) {
-        self.rows.clear();
+        self.move_in();
+        self.room.rows.clear();
         let mut touch_rows = [None; MAX_TOUCHES];
         // Fingers first: they are never left out.
         for (touch, row) in touches.iter().zip(&mut touch_rows) {
             let Some(place) = self.roster.place_of_entity(touch.entity) else { continue };
             let (state, motion) = (&self.bodies[place], moving(&self.bodies[place]));
-            *row = Some(self.rows.len());
-            self.rows.push(touch.row(place, &state.centre_W, &motion, &entities[touch.entity], dt_s));
+            *row = Some(self.room.rows.len());
+            self.room.rows.push(touch.row(place, &state.centre_W, &motion, &entities[touch.entity], dt_s));
         }
         self.hand.gather(
             &HandStart {
@@ -71,15 +72,15 @@ impl Manipulation {
                 dt_s,
             },
             fingers,
-            &mut self.rows,
+            &mut self.room.rows,
         );
-        self.pressing = self.rows.len();
+        self.pressing = self.room.rows.len();
         let pull_rows = self.gather_pulls(pulls, dt_s);
-        self.touching = self.rows.len();
-        self.restitution.meetings.clear();
+        self.touching = self.room.rows.len();
+        self.room.restitution.meetings.clear();
         let mut left_out = 0;
-        let room = self.rows.capacity() - self.rows.len();
-        let [most_rows, of_bodies] = [room, room - room / 4].map(|room| self.rows.len() + room);
+        let room = self.room.rows.capacity() - self.room.rows.len();
+        let [most_rows, of_bodies] = [room, room - room / 4].map(|room| self.room.rows.len() + room);
         for at in 0..self.pairs.awake_count() {
             let (key, _) = self.pairs.awake_at(at);
             let other = self.roster.place_of_entity(key.entity as usize);
@@ -114,16 +115,16 @@ impl Manipulation {
             let is_near = pair.gather(
                 &start,
                 &mut Gathered {
-                    rows: &mut self.rows,
+                    rows: &mut self.room.rows,
                     most_rows: if is_with_body { of_bodies } else { most_rows },
                     left_out: &mut left_out,
-                    meetings: &mut self.restitution.meetings,
+                    meetings: &mut self.room.restitution.meetings,
                     last: &mut self.last_anchors,
                 },
             );
             self.pairs.set_near(at, is_near);
         }
-        self.pairs.left_out += left_out;
+        self.pairs.left_out += left_out + std::mem::take(&mut self.pairs.missing);
         (touch_rows, pull_rows)
     }
 
@@ -134,8 +135,8 @@ impl Manipulation {
             let Some(body) = self.roster.place_of_entity(pull.entity) else { continue };
             let (state, motion) = (&self.bodies[body], moving(&self.bodies[body]));
             if let Some(row) = pull.row(body, &state.centre_W, &motion, dt_s) {
-                *place = Some(self.rows.len());
-                self.rows.push(row);
+                *place = Some(self.room.rows.len());
+                self.room.rows.push(row);
             }
         }
         pull_rows

@@ -14,7 +14,7 @@ impl Manipulation {
     pub fn is_held(&self, body: usize) -> bool {
         let place = self.roster.place(body);
         let touched =
-            place.is_some_and(|place| self.rows[..self.touching].iter().any(|row| row.body == place));
+            place.is_some_and(|place| self.room.rows[..self.touching].iter().any(|row| row.body == place));
         touched || self.hand.is_tied_to(body)
     }
 

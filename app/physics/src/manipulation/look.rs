@@ -16,7 +16,7 @@ impl Manipulation {
         let Some(place) = self.roster.place(body) else { return Some(GraspQuality::default()) };
         let weight_W = self.settings.gravity_W * state.mass.mass_kg;
         // Arms are those of the tick's beginning: any centre will do.
-        Some(grasp::quality(&self.rows, self.pressing, place, (&state.centre_W, &weight_W)))
+        Some(grasp::quality(&self.room.rows, self.pressing, place, (&state.centre_W, &weight_W)))
     }
 
     /// The line between the two fingers that held a body in the last tick.
@@ -79,12 +79,12 @@ impl Manipulation {
 
     /// The contact points of the last tick, with their forces. Their bodies are [places](Self::awake).
     pub fn rows(&self) -> &[Row] {
-        &self.rows
+        &self.room.rows
     }
 
     /// Which bodies were in touch in the last tick, by their places among those that are awake.
     pub fn islands(&self) -> &Islands {
-        self.solver.islands()
+        self.room.solver.islands()
     }
 
     /// The numbers of the bodies that are stepped, in ascending order; their places here are what rows call bodies.
@@ -106,7 +106,9 @@ impl Manipulation {
 
     /// Of each pair of entities what its springs may press with in the next tick \[J\], and its rows of the last tick.
     pub fn springs(&self) -> impl Iterator<Item = ([usize; 2], f64, &[Row])> {
-        self.pairs.iter().map(|(_, pair)| (pair.entities, pair.elastic_energy_j(), pair.rows(&self.rows)))
+        self.pairs
+            .iter()
+            .map(|(_, pair)| (pair.entities, pair.elastic_energy_j(), pair.rows(&self.room.rows)))
     }
 
     /// Bodies that do not move any more, in the order in which they were parked: the last [`Made::parked`](crate::Made::parked) of them in the last

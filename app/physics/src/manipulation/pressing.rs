@@ -9,7 +9,7 @@ impl Manipulation {
     /// The entities of which at least one was awake and which touched in the last tick, and the force on the first of the
     /// two \[N\]: in the order of bodies, the first being the body of the lower number.
     pub fn pair_forces(&self) -> impl Iterator<Item = ([usize; 2], Vector3<f64>)> {
-        self.pairs.iter_awake().map(|(_, pair)| (pair.entities, pair.force_W(&self.rows)))
+        self.pairs.iter_awake().map(|(_, pair)| (pair.entities, pair.force_W(&self.room.rows)))
     }
 
     /// Whether nobody steps these two at the time because at least one of them sleeps: what they did to each other, they still

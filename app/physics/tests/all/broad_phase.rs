@@ -4,7 +4,7 @@
 use crate::common;
 
 use common::*;
-use haptics::Cuboid;
+use haptics::{Cuboid, Sphere};
 use nalgebra::{Isometry3, Point3, UnitQuaternion, Vector3};
 use physics::{Aabb, BroadPhase};
 
@@ -43,11 +43,33 @@ fn a_box_has_all_corners_of_what_is_turned_in_it_and_room_for_where_that_goes() 
         assert!(broad_phase.around(0).unwrap().contains(&tight.grown(4.9e-3)));
         let ahead_W = Vector3::new(0.1, -0.2, 0.05);
         entity.move_to(Isometry3::translation(0.02, 0.0, 0.0) * entity.X_WB);
-        assert!(broad_phase.moved(0, &entity, &ahead_W));
+        assert!(broad_phase.was_put(0, &entity, &ahead_W));
         let now = Aabb::of_entity(&entity).unwrap();
         assert!(broad_phase.around(0).unwrap().contains(&now.swept(&ahead_W).grown(4.9e-3)));
         // It stays in there, and nothing has to be done.
         entity.move_to(Isometry3::translation(0.09, -0.19, 0.04) * entity.X_WB);
-        assert!(!broad_phase.moved(0, &entity, &ahead_W));
+        assert!(!broad_phase.was_put(0, &entity, &ahead_W));
+    }
+}
+
+#[test]
+fn what_moves_is_in_its_box_in_the_next_tick_too() {
+    for speed_m_s in [0.01, 0.3, 2.0, 20.0, 200.0] {
+        let mut entity = object(Sphere::new(0.01).unwrap(), Isometry3::identity(), 1000.0, 0.5);
+        let mut broad_phase = BroadPhase::new(std::slice::from_ref(&entity));
+        let way_W = Vector3::new(0.6, -0.8, 0.0) * (speed_m_s * 1e-3);
+        let mut changes = 0;
+        for _ in 0..1000 {
+            entity.move_to(Isometry3::from(nalgebra::Translation3::from(way_W)) * entity.X_WB);
+            changes += i32::from(broad_phase.moved(0, &entity, &way_W));
+            let next = Aabb::of_entity(&entity).unwrap().swept(&way_W);
+            assert!(broad_phase.around(0).unwrap().contains(&next), "{speed_m_s} m/s");
+        }
+        // 5 mm around it, along the faster axis, and at least three ticks.
+        let most = (0.8 * speed_m_s / 5e-3).min(1000.0 / 2.0) + 2.0;
+        assert!(f64::from(changes) <= most, "{changes} changes at {speed_m_s} m/s");
+        let around = broad_phase.around(0).unwrap();
+        let longest_m = (around.high_W - around.low_W).max();
+        assert!(longest_m < 0.03 + 0.01_f64.max(3.1e-3 * speed_m_s), "{longest_m} m at {speed_m_s} m/s");
     }
 }

@@ -4,7 +4,7 @@
 use crate::common;
 
 use common::*;
-use haptics::{Cuboid, Entity};
+use haptics::{Cuboid, Entity, Sphere};
 use nalgebra::Isometry3;
 use physics::{Body, ContactStiffness, Settings};
 
@@ -33,6 +33,7 @@ fn nothing_falls_through_the_floor_for_want_of_room() {
     ];
     for (counts, size, apart, is_full) in blocks {
         let mut world = block(counts, size, apart);
+        world.makes_room = false;
         for _ in 0..40 {
             world.step(&[]);
         }
@@ -43,4 +44,33 @@ fn nothing_falls_through_the_floor_for_want_of_room() {
         assert!(sunk_m < 0.5 * size[1] && sunk_m < 1e-3, "{counts:?}: {sunk_m} m");
         assert_eq!(left_out > 0, is_full, "{counts:?}: {left_out}");
     }
+}
+
+#[test]
+fn a_heap_has_the_room_that_it_needs() {
+    // Of 600 balls, which fall in a column and flow apart; balls were in each other by 3 mm and more when there was room for
+    // three of each.
+    let mut entities: Vec<Entity> = vec![floor(0.0, 1000.0, 0.5)];
+    for at in 0..600 {
+        let [x, y, z] = [at % 8, at / 64, at / 8 % 8].map(|place| f64::from(place) * 0.0215);
+        let lean = f64::from(at * 7919 % 600) * 1e-6;
+        let X_WB = Isometry3::translation(x + lean, 0.011 + y, z - lean);
+        entities.push(object(Sphere::new(0.01).unwrap(), X_WB, 1000.0, 0.5));
+    }
+    let bodies: Vec<(usize, Body)> = (1..entities.len()).map(|at| (at, body(&entities[at], 0.01))).collect();
+    let contact_stiffness = ContactStiffness::ByMass { damping_ratio: 1.0 };
+    let mut world = World::new(entities, &bodies, Settings { contact_stiffness, ..Settings::default() }, 0);
+    for tick in 0..1000 {
+        world.step(&[]);
+        let lowest = world.manipulation.bodies().iter().map(|body| body.centre_W.y).fold(f64::MAX, f64::min);
+        // By 0.2 mm where columns of ten have fallen on them.
+        assert!(lowest > 0.0095, "tick {tick}: {lowest} m");
+    }
+    assert_eq!(world.manipulation.left_out(), 0);
+    let centres: Vec<_> = world.manipulation.bodies().iter().map(|body| body.centre_W).collect();
+    let pairs =
+        centres.iter().enumerate().flat_map(|(at, one)| centres[..at].iter().map(move |other| one - other));
+    let nearest = pairs.map(|way_W| way_W.norm()).fold(f64::MAX, f64::min);
+    // The weight of ten balls sinks in by 1e-4 of their radius on contacts by mass.
+    assert!(nearest > 0.0198, "{nearest} m");
 }

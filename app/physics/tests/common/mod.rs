@@ -17,6 +17,8 @@ pub struct World {
     /// What the fingers do besides touching; their HIPs are set by `step`.
     pub ticks: Vec<FingerTick>,
     pub made: Made,
+    /// Whether there is more room for contacts when it is needed.
+    pub makes_room: bool,
 }
 
 impl World {
@@ -25,7 +27,15 @@ impl World {
         let finger = || Finger::new(0.0, entities.len()).unwrap().with_ramp_in(0.0).unwrap();
         let fingers: Vec<_> = (0..fingers).map(|_| finger()).collect();
         let ticks = vec![FingerTick::at(Vector3::zeros()); fingers.len()];
-        Self { entities, manipulation, fingers, touches: Vec::new(), ticks, made: Made::default() }
+        Self {
+            entities,
+            manipulation,
+            fingers,
+            touches: Vec::new(),
+            ticks,
+            made: Made::default(),
+            makes_room: true,
+        }
     }
 
     /// With fingers that are more than points, all alike.
@@ -51,6 +61,9 @@ impl World {
             }
         }
         let rendered = self.touches.clone();
+        if self.makes_room {
+            self.manipulation.make_room(&self.entities);
+        }
         self.made = self.manipulation.step_with(&mut self.entities, &mut self.touches, &mut self.ticks, dt_s);
         for (touch, was) in self.touches.iter().zip(rendered) {
             forces[touch.finger] += touch.force_on_user_W - was.force_on_user_W;

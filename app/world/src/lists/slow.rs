@@ -70,6 +70,7 @@ impl SlowList {
             if self.manipulation.awake().is_empty() {
                 break;
             }
+            self.manipulation.make_room(&self.entities);
             let made = self.manipulation.step(&mut self.entities, &mut [], dt_s);
             self.stepped += 1;
             self.look(made.parked, dt_s);

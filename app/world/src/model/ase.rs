@@ -71,7 +71,11 @@ impl<'t> Read<'t> {
             material: (0, None),
         };
         read.all()?;
-        if read.faces.is_empty() { Err(ModelError::NoTriangle) } else { Ok(read) }
+        if read.faces.is_empty() {
+            Err(ModelError::NoTriangle { points: read.vertices.len() })
+        } else {
+            Ok(read)
+        }
     }
 
     fn names(&self) -> FaceNames {

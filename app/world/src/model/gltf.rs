@@ -24,7 +24,7 @@ mod materials;
 
 use super::appearance::Appearance;
 use super::ply::Strip;
-use super::{FaceNames, ModelError};
+use super::{FaceNames, ModelError, with_triangles};
 use accessor::Accessors;
 use buffers::Buffers;
 use deformed::Skin;
@@ -90,7 +90,7 @@ fn read(bytes: &[u8], beside: Option<&Path>) -> Result<(TriangleSoup, FaceNames)
     let buffers = Buffers::load(&document, binary, beside)?;
     let mut merged = Merged::new(&document, &buffers, bytes.len());
     merged.add_nodes()?;
-    if merged.soup.faces.is_empty() { Err(ModelError::NoTriangle) } else { Ok((merged.soup, merged.names)) }
+    Ok((with_triangles(merged.soup)?, merged.names))
 }
 
 /// Whether a file without a name would be taken for glTF.

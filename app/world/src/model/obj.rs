@@ -10,7 +10,7 @@
 
 use super::polygon::{Divider, indivisible};
 use super::words::BYTE_ORDER_MARK;
-use super::{FaceNames, ModelError, a_number, number, shown};
+use super::{FaceNames, ModelError, a_number, number, shown, with_triangles};
 use haptics::mesh::{CornerUv, TriangleSoup};
 use nalgebra::Vector3;
 use std::borrow::Cow;
@@ -25,11 +25,7 @@ pub fn read_obj(bytes: &[u8]) -> Result<TriangleSoup, ModelError> {
     read.for_each_triangle(|corners, begin, face| {
         faces.push(face.map(|number| corners[begin + number as usize]));
     })?;
-    if faces.is_empty() {
-        Err(ModelError::NoTriangle)
-    } else {
-        Ok(TriangleSoup { vertices: read.vertices, faces })
-    }
+    with_triangles(TriangleSoup { vertices: read.vertices, faces })
 }
 
 /// Reads an OBJ file whose faces have texture coordinates; one triple for each triangle of the soup.
@@ -46,8 +42,7 @@ pub fn read_obj_with_uv(bytes: &[u8]) -> Result<(TriangleSoup, Vec<CornerUv>), M
         faces.push(at.map(|corner| corners[corner]));
         uv.push(at.map(|corner| textures.uv[textures.corners[corner] as usize]));
     })?;
-    let soup = TriangleSoup { vertices: read.vertices, faces };
-    if soup.faces.is_empty() { Err(ModelError::NoTriangle) } else { Ok((soup, uv)) }
+    Ok((with_triangles(TriangleSoup { vertices: read.vertices, faces })?, uv))
 }
 
 /// Names of the triangles that [`read_obj`] returns: their object (`o`), their groups (`g`) and their material

@@ -13,8 +13,8 @@
 mod header;
 mod source;
 
-use super::ModelError;
 use super::polygon::{Polygons, indivisible};
+use super::{ModelError, with_triangles};
 use haptics::mesh::TriangleSoup;
 use header::{Element, Header, Kind};
 use nalgebra::Vector3;
@@ -130,11 +130,7 @@ impl Read {
             ModelError::Place { place: format!("face {number} (counted from 0)"), found, allowed }
         })?;
         faces.extend(self.faces);
-        if faces.is_empty() {
-            Err(ModelError::NoTriangle)
-        } else {
-            Ok(TriangleSoup { vertices: self.vertices, faces })
-        }
+        with_triangles(TriangleSoup { vertices: self.vertices, faces })
     }
 }
 

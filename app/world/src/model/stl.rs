@@ -9,7 +9,7 @@
 
 use super::obj::looks_like_obj;
 use super::words::{BYTE_ORDER_MARK, Words};
-use super::{ModelError, shown};
+use super::{ModelError, shown, with_triangles};
 use haptics::mesh::TriangleSoup;
 use nalgebra::Vector3;
 
@@ -28,8 +28,7 @@ pub fn read_stl(bytes: &[u8]) -> Result<TriangleSoup, ModelError> {
         let allowed = "STL; if it is OBJ, let its name end in .obj".into();
         return Err(ModelError::Byte { offset: 0, found, allowed });
     }
-    let soup = if is_text(bytes) { read_text(bytes) } else { read_binary(bytes) }?;
-    if soup.faces.is_empty() { Err(ModelError::NoTriangle) } else { Ok(soup) }
+    with_triangles(if is_text(bytes) { read_text(bytes) } else { read_binary(bytes) }?)
 }
 
 /// Whether a file without a name would be taken for STL.

@@ -5,7 +5,7 @@
 //! them are of which material (0x4130). Vertices
 //! are in the world already. Everything else is passed over. The z axis of such files points up; their unit is any.
 
-use super::{FaceNames, ModelError};
+use super::{FaceNames, ModelError, with_triangles};
 use haptics::mesh::TriangleSoup;
 use nalgebra::Vector3;
 
@@ -39,7 +39,7 @@ fn read(bytes: &[u8]) -> Result<(TriangleSoup, FaceNames), ModelError> {
         Some(Err(error)) => return Err(error),
         _ => return Err(whole.wrong(0, "no chunk 0x4D4D".into(), "one, as every 3DS file begins")),
     }
-    if soup.faces.is_empty() { Err(ModelError::NoTriangle) } else { Ok((soup, names)) }
+    Ok((with_triangles(soup)?, names))
 }
 
 /// Whether a file without a name would be taken for 3DS.

@@ -139,7 +139,15 @@ fn what_is_wrong_with_an_obj_is_told_with_its_line() {
         obj_refused(&after(line), &format!("line 4: {message}"));
         obj_refused(&after(line).replace('\n', "\r\n"), &format!("line 4: {message}"));
     }
-    obj_refused("v 0 0 0\n", "found no triangle in it; allowed: at least one");
+    obj_refused(
+        "v 0 0 0\n",
+        "found no triangle in it, only a point, which has no surface; allowed: at least one",
+    );
+    obj_refused(
+        "v 0 0 0\nv 1 0 0\nv 0 1 0\nl 1 2\np 3\n",
+        "found no triangle in it, only 3 points, which have no surface until a program for meshes makes one through them; \
+         allowed: at least one",
+    );
     obj_refused("", "found no triangle in it; allowed: at least one");
     obj_refused("f 1 2 3\n", "line 1: found vertex 1; allowed: a vertex, but there is none");
     let bow_tie = "v 0 0 0\nv 1 1 0\nv 1 0 0\nv 0 1 0\nv 2 1 1\n\nf 1 2 3 4 5\n";
