@@ -67,6 +67,8 @@ pub struct Manipulation {
     speeds_m_s: Vec<f64>,
     /// Of each body, what a tick took from it \[J\].
     spare_j: Vec<f64>,
+    /// Of each island, what impulses put into it in a tick \[J\].
+    impulses_j: Vec<f64>,
     hand: Hand,
     sets: Sets,
     /// The first so many rows are fingers', and the first so many of these press or hold.
@@ -158,6 +160,7 @@ impl Manipulation {
             changes: Vec::with_capacity(places),
             speeds_m_s: Vec::with_capacity(places),
             spare_j: Vec::with_capacity(places),
+            impulses_j: Vec::with_capacity(places),
             hand: Hand::new(&[], count),
             sets: Sets::with_capacity(count),
             touching: 0,

@@ -316,22 +316,20 @@ impl Pair {
         }
     }
 
-    /// Takes what its impulses put in from what the tick took from the bodies (J): that the tick has not taken. What is more is owed:
-    /// an impulse has pushed a body into the spring of another pair. For all pairs, before any of them [settles](Self::settle).
-    pub(crate) fn take_impulses(&self, end: &End<'_>, spare_j: &mut [f64]) {
+    /// What its impulses put in, by the velocities that they left (J), negative: what they took; and a body of it that moves.
+    pub(crate) fn impulses_j(&self, end: &End<'_>) -> Option<(usize, f64)> {
         // Without rows its places are of another tick.
         if self.rows == 0 || self.surfacing.response.restitution().is_none() {
-            return;
+            return None;
         }
+        let body = self.moving(end).into_iter().flatten().next()?;
         let put_in_w = |row: &Row| (row.force_W - self.of_spring_W(row)).dot(&velocity(row, end.motions));
-        let mut left_j = self.rows(end.rows).iter().map(put_in_w).sum::<f64>().max(0.0) * end.dt_s;
-        let (body, other) = self.bodies;
-        for body in [Some(body), other].into_iter().flatten() {
-            let part_j = left_j.min(spare_j[body].max(0.0));
-            spare_j[body] -= part_j;
-            left_j -= part_j;
-        }
-        spare_j[body] -= left_j;
+        Some((body, self.rows(end.rows).iter().map(put_in_w).sum::<f64>() * end.dt_s))
+    }
+
+    /// Those of its bodies that anything moves.
+    fn moving(&self, end: &End<'_>) -> [Option<usize>; 2] {
+        [Some(self.bodies.0), self.bodies.1].map(|body| body.filter(|&body| end.motions[body].is_movable()))
     }
 
     /// Takes note of how the tick ended, and of which rows met in it after it had begun. `spare_j`: of each body what the tick itself
@@ -361,17 +359,15 @@ impl Pair {
             worked_j += row.torque_W().dot(&spin_W(row, end.motions)) * end.dt_s;
         }
         self.ledger.enter(worked_j);
-        let moves = |body: &usize| end.motions[*body].is_movable();
-        let bodies = || [Some(self.bodies.0), self.bodies.1].into_iter().flatten().filter(moves);
         if presses && self.ledger.owes() {
-            for body in bodies() {
+            for body in self.moving(end).into_iter().flatten() {
                 let refunded_j = spare_j[body].max(0.0);
                 spare_j[body] -= refunded_j;
                 self.ledger.refund(refunded_j);
             }
         }
         let debt_j = self.ledger.take_debt();
-        if let Some(body) = bodies().next() {
+        if let Some(body) = self.moving(end).into_iter().flatten().next() {
             spare_j[body] -= debt_j;
         }
     }

@@ -64,8 +64,16 @@ impl Manipulation {
             *spare_j -= self.roster.owed_j[body];
         }
         let end = End { rows: &self.room.rows, motions: &self.motions, entities, dt_s };
-        for at in 0..self.pairs.awake_count() {
-            self.pairs.awake_at(at).1.take_impulses(&end, &mut self.spare_j);
+        let islands = self.room.solver.islands();
+        self.impulses_j.clear();
+        self.impulses_j.resize(islands.iter().len(), 0.0);
+        for (body, put_in_j) in self.pairs.iter_awake().filter_map(|(_, pair)| pair.impulses_j(&end)) {
+            if let Some(island) = islands.island_of(body) {
+                self.impulses_j[island] += put_in_j;
+            }
+        }
+        for (bodies, &put_in_j) in islands.iter().zip(&self.impulses_j) {
+            share_out(put_in_j, bodies, &mut self.spare_j);
         }
         for at in 0..self.pairs.awake_count() {
             let has_met = |row| self.room.restitution.has_met(row);
@@ -91,6 +99,22 @@ impl Manipulation {
                 gets.is_free &= row.force_W == Vector3::zeros() && torque_W == Vector3::zeros();
             }
         }
+    }
+}
+
+/// Takes what the impulses of an island put in from what the tick took from its bodies (J): that the tick has not taken. What is
+/// more is owed: an impulse has pushed a body into the spring of another pair. What they took pays what is owed.
+fn share_out(put_in_j: f64, bodies: &[usize], spare_j: &mut [f64]) {
+    let mut left_j = put_in_j;
+    for &body in bodies {
+        let of_body_j = &mut spare_j[body];
+        let part_j =
+            if left_j > 0.0 { left_j.min(of_body_j.max(0.0)) } else { left_j.max(of_body_j.min(0.0)) };
+        *of_body_j -= part_j;
+        left_j -= part_j;
+    }
+    if let Some(&body) = bodies.first() {
+        spare_j[body] -= left_j.max(0.0);
     }
 }
 

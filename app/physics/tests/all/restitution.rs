@@ -318,3 +318,39 @@ fn what_is_small_beside_its_rolling_friction_gains_nothing_from_a_bounce() {
         }
     }
 }
+
+/// Boxes that fall on each other and on a floor, which all bounce: an impulse that is passed on to the floor is no debt of who
+/// passes it on, for which it would sink.
+#[test]
+fn what_was_hit_rests_on_its_springs_and_not_below_them() {
+    let mut noise = Noise::new(7);
+    for case in 0..60 {
+        let restitution = [0.3, 0.6, 0.9, 0.95][case % 4];
+        let rate_hz = RATES_HZ[case % 3];
+        let [low, high] = [[0.1, 0.03, 0.06], [0.06; 3]].map(|size| Cuboid::new(size).unwrap());
+        let beside = Vector3::new(noise.within(-0.04, 0.04), 0.25, noise.within(-0.02, 0.02));
+        let mut entities = vec![
+            floor(0.0, 1000.0, 0.3),
+            object(low, Isometry3::translation(0.0, 0.01501, 0.0), 1000.0, 0.3),
+            object(high, Isometry3::from_parts(beside.into(), noise.turn()), 1000.0, 0.3),
+        ];
+        for entity in &mut entities[1..] {
+            entity.restitution = Some(restitution);
+        }
+        let mass_kg = noise.log_within(0.01, 0.5);
+        let bodies = [mass_kg, mass_kg * noise.within(0.5, 4.0)]
+            .into_iter()
+            .zip(1..)
+            .map(|(mass_kg, at)| (at, body(&entities[at], mass_kg)));
+        let contact_stiffness = ContactStiffness::ByMass { damping_ratio: 1.0 };
+        let settings = Settings { contact_stiffness, ..Settings::default() };
+        let mut manipulation = Manipulation::new(&entities, &bodies.collect::<Vec<_>>(), settings).unwrap();
+        for _ in 0..(4.0 * rate_hz) as u32 {
+            manipulation.step(&mut entities, &mut [], rate_hz.recip());
+        }
+        let sunk_m = 0.015 - manipulation.bodies()[0].centre_W.y;
+        // The heavier one on a point of its stiffness.
+        let deepest_m = 2.0 * G / 1000.0_f64.powi(2);
+        assert!(sunk_m < deepest_m, "{case}: {sunk_m} m, e {restitution}, {rate_hz} Hz");
+    }
+}
