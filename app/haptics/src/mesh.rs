@@ -139,7 +139,7 @@ impl Mesh {
     pub fn into_sheet(mut self) -> Self {
         for face in &mut self.faces {
             face.sides = Sides::Sheet;
-            (face.is_crossed, face.is_beside, face.is_at_ledge) = (false, false, false);
+            (face.is_beside, face.is_at_ledge) = (false, false);
         }
         Self { sides: Sides::Sheet, has_inside: false, convex_inner_m: None, ..self }
     }

@@ -123,13 +123,13 @@ impl Mesh {
             labels: None,
             extremes: OnceLock::new(),
         };
-        report.crossed = mesh.mark_crossed();
+        report.crossed = mesh.mark_crossed(&parts);
         mesh.turn_outward(&parts, &mut report);
         let is_fitting;
         (report.narrow_gaps, is_fitting) = mesh.mark_beside(&parts);
         mesh.fit(&is_fitting, &mut report.narrow_gaps);
         if report.narrow_gaps.moved > 0 {
-            mesh.mark_crossed();
+            mesh.mark_crossed(&parts);
         }
         mesh.mark_ledges();
         mesh.convex_inner_m = if parts.len() == 1 { mesh.find_convex_inner_m() } else { None };

@@ -6,42 +6,44 @@
 //! Model: two triangles have no common point if along the normal of one of them, or along a direction across an edge of
 //! each, they are apart (separating axes). What share a vertex are neighbours, and are left out.
 //!
-//! Sheets are left out, too: a Klein bottle passes through itself, and whoever walks over it goes on.
+//! A part that cannot be oriented is no obstacle to itself: a Klein bottle passes through itself, and whoever walks over it goes on.
 //!
 //! In doubt a face is taken for crossed: that costs a walk time, and nothing else.
 //! Cost: about linear; at most [`MOST_PAIRS`] for each face, beyond which all are taken for crossed.
 
 use nalgebra::Vector3;
 
-use super::{Mesh, Sides};
+use super::Mesh;
+use super::winding::Parts;
 
 /// Boxes of more pairs overlap only where faces lie in heaps upon one another.
 pub(super) const MOST_PAIRS: usize = 1000;
 
 impl Mesh {
     /// Marks the faces that others pass through, and says how many they are.
-    pub(super) fn mark_crossed(&mut self) -> usize {
+    pub(super) fn mark_crossed(&mut self, parts: &Parts) -> usize {
         let mut is_crossed = vec![false; self.faces.len()];
         let is_done =
-            self.for_each_crossed_pair(|pair| pair.iter().for_each(|&face| is_crossed[face] = true));
+            self.for_each_crossed_pair(parts, |pair| pair.iter().for_each(|&face| is_crossed[face] = true));
         for (face, is_crossed) in self.faces.iter_mut().zip(is_crossed) {
-            face.is_crossed = is_crossed || !is_done && face.sides == Sides::Solid;
+            face.is_crossed = is_crossed || !is_done;
         }
         self.faces.iter().filter(|face| face.is_crossed).count()
     }
 
     /// Visits each pair of faces that pass through each other once; says whether these are all.
     #[inline(always)]
-    pub(super) fn for_each_crossed_pair(&self, mut visit: impl FnMut([usize; 2])) -> bool {
+    pub(super) fn for_each_crossed_pair(&self, parts: &Parts, mut visit: impl FnMut([usize; 2])) -> bool {
         let slack_m = TOUCHING * self.extent_m;
         let mut left = MOST_PAIRS.saturating_mul(self.faces.len());
         self.bvh.for_each_pair(0.0, |i, j| {
             let pair = [i, j].map(|face| &self.faces[face as usize]);
             let corners = || pair.map(|face| face.vertices.map(|vertex| self.vertices[vertex as usize]));
-            let are_solid = pair.iter().all(|face| face.sides == Sides::Solid);
             let are_neighbours = || pair[0].vertices.iter().any(|vertex| pair[1].vertices.contains(vertex));
             let normals = pair.map(|face| face.normal_B);
-            if are_solid && !are_neighbours() && do_cross(&corners(), &normals, slack_m) {
+            let [one, other] = [i, j].map(|face| parts.of(face as usize));
+            let is_obstacle = one != other || parts.is_orientable(one);
+            if is_obstacle && !are_neighbours() && do_cross(&corners(), &normals, slack_m) {
                 visit([i, j].map(|face| face as usize));
             }
             left -= 1;

@@ -65,7 +65,7 @@ impl Mesh {
             return outermost;
         }
         let mut crossed = HashSet::new();
-        let is_done = self.for_each_crossed_pair(|pair| {
+        let is_done = self.for_each_crossed_pair(parts, |pair| {
             let [a, b] = pair.map(|face| parts.of(face));
             crossed.extend([[a, b], [b, a]]);
         });

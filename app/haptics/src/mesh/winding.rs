@@ -35,6 +35,11 @@ impl Parts {
         self.all[part].first
     }
 
+    /// Whether a part has two sides, perhaps both outside.
+    pub(super) fn is_orientable(&self, part: usize) -> bool {
+        self.all[part].is_orientable
+    }
+
     /// From where a face is felt.
     pub(super) fn sides(&self, face: usize) -> Sides {
         if self.all[self.of(face)].has_inside() { Sides::Solid } else { Sides::Sheet }

@@ -4,7 +4,7 @@ use crate::common::meshes::*;
 use crate::common::*;
 use crate::mesh_oracle::winding_number;
 use haptics::mesh::{Mesh, TriangleSoup, make};
-use haptics::{Csg, CsgPart, CsgTree, Cuboid, Friction, Shape};
+use haptics::{Csg, CsgPart, CsgTree, Cuboid, FingerOutput, Friction, Shape};
 use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
 use std::sync::Arc;
 
@@ -143,4 +143,111 @@ fn boxes_that_overlap_feel_as_the_solid_that_they_are_together() {
     // Solids joined of others are held against oracles of their own. Where four and more faces meet, a walk that knows two at
     // a time may rest although there is a way on: 84 of 146,747 ticks.
     assert!(touched > 100_000 && differ * 500 < touched, "{differ} of {touched}");
+}
+
+/// Four corners as two triangles: an open part.
+fn with_sheet(mut all: TriangleSoup, corners: [[f64; 3]; 4]) -> TriangleSoup {
+    let first = all.vertices.len() as u32;
+    all.vertices.extend(corners.map(Vector3::from));
+    all.faces.extend([[first, first + 1, first + 2], [first, first + 2, first + 3]]);
+    all
+}
+
+/// Up to `y = 0.02` a block, through whose sides a sheet goes at the height `y = 0`, leaned by so much.
+fn block_with_shelf(lean: f64) -> TriangleSoup {
+    let at = |x: f64, z: f64| [x, lean * (x + 0.02), z];
+    with_sheet(
+        make::cuboid([0.04; 3]),
+        [at(-0.06, -0.01), at(-0.06, 0.01), at(0.061, 0.01), at(0.061, -0.01)],
+    )
+}
+
+/// Along a way in x, 1 mm below the height that it has there.
+fn slid(
+    mesh: &Arc<Mesh>,
+    friction: Friction,
+    from_x: f64,
+    to_x: f64,
+    height: impl Fn(f64) -> f64,
+) -> FingerOutput {
+    let entity = touchable(mesh, friction);
+    let mut finger = point_finger();
+    step(&mut finger, &entity, &Vector3::new(from_x, height(from_x) + 1e-4, 1e-3));
+    let at = |share: f64| from_x + (to_x - from_x) * share;
+    let ticks = (0..=1000).map(|tick| at(f64::from(tick) * 1e-3));
+    ticks.map(|x| step(&mut finger, &entity, &Vector3::new(x, height(x) - 1e-3, 1e-3))).last().unwrap()
+}
+
+#[test]
+fn along_a_sheet_a_finger_comes_to_the_solid_that_it_goes_through_and_no_farther() {
+    for lean in [0.0, 0.1, -0.1] {
+        let closed = built(block_with_shelf(lean));
+        for mesh in
+            [Arc::clone(&closed), Arc::new(Mesh::build(block_with_shelf(lean)).unwrap().0.into_sheet())]
+        {
+            for friction in [Friction::None, Friction::coulomb(0.1).unwrap()] {
+                let out = slid(&mesh, friction, -0.04, 0.0, |x| lean * (x + 0.02));
+                assert!((out.god_object_W - Vector3::new(-0.02, 0.0, 1e-3)).norm() < 2e-3, "{lean}: {out:?}");
+                assert!((out.force_on_user_W.x / K + 0.02).abs() < 1e-3, "{lean}: {out:?}");
+            }
+        }
+    }
+}
+
+#[test]
+fn along_a_floor_a_finger_comes_to_the_open_wall_that_stands_in_it() {
+    for (lean, below) in [(0.0, -0.01), (0.15, -0.01), (0.1, -0.05)] {
+        let wall = |y: f64, z: f64| [1.3e-3 + lean * y, y, z];
+        let corners = [wall(below, -0.03), wall(below, 0.03), wall(0.05, 0.03), wall(0.05, -0.03)];
+        let on_block = |wall: f64| Vector3::new(wall, 0.02, 1e-3);
+        let solid = built(with_sheet(make::cuboid([0.04; 3]), corners));
+        let floor = [[-0.06, 0.02, -0.02], [-0.06, 0.02, 0.02], [0.06, 0.02, 0.02], [0.06, 0.02, -0.02]];
+        let sheets = built(with_sheet(with_sheet(TriangleSoup::default(), floor), corners));
+        for mesh in [solid, sheets] {
+            for (from_x, to_x) in [(-0.01, 0.011), (0.015, -0.008)] {
+                let out = slid(&mesh, Friction::None, from_x, to_x, |_| 0.02);
+                let met = on_block(1.3e-3 + lean * 0.02);
+                assert!((out.god_object_W - met).norm() < 2e-3, "{lean}, from {from_x}: {out:?}");
+                let pushed_m = out.force_on_user_W.x / K;
+                assert!((pushed_m - (met.x - to_x)).abs() < 1e-3, "{lean}, from {from_x}: {out:?}");
+            }
+        }
+    }
+}
+
+#[test]
+fn among_boxes_that_sheets_go_through_no_finger_gets_into_one() {
+    let mut touched = 0;
+    for seed in 0..40 {
+        let mut noise = Noise(seed);
+        let blocks = heap(&mut noise);
+        let solid = Arc::new(Mesh::build(soup(&blocks)).unwrap().0);
+        let mut all = soup(&blocks);
+        for _ in 0..1 + seed % 3 {
+            let turn = UnitQuaternion::new(noise.vector(1.0));
+            let middle = noise.vector(0.02);
+            let corner = |x: f64, z: f64| (middle + turn * Vector3::new(0.05 * x, 0.0, 0.05 * z)).into();
+            all =
+                with_sheet(all, [corner(-1.0, -1.0), corner(-1.0, 1.0), corner(1.0, 1.0), corner(1.0, -1.0)]);
+        }
+        let mesh = built(all);
+        let entity = touchable(&mesh, Friction::None);
+        let mut finger = point_finger();
+        let mut roaming = Roaming::new(seed, 0.05, 3e-4);
+        for tick in 0..6000 {
+            let hip = roaming.next();
+            let out = step(&mut finger, &entity, &hip);
+            let told = || format!("{seed}, {tick}: {hip:?}\n{out:?}");
+            if out.entity.is_none() {
+                assert!(winding_number(&solid, &hip) < 0.5, "lost: {}", told());
+                continue;
+            }
+            touched += 1;
+            if winding_number(&solid, &out.god_object_W) > 0.6 {
+                let mut beside = (0..2000).map(|_| out.god_object_W + noise.vector(1e-9));
+                assert!(beside.any(|p| winding_number(&solid, &p) < 0.5), "inside: {}", told());
+            }
+        }
+    }
+    assert!(touched > 50_000, "{touched}");
 }
