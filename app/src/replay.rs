@@ -292,6 +292,7 @@ impl Play {
         let mut feed = lock(&feed);
         let failure: Result<(), ReadError> = feed.failure.take().map_or(Ok(()), Err);
         let until_s = run_time_s(self.fast.run_ticks().saturating_sub(1).cast_signed(), period_ns);
+        let is_cut = feed.recorded.cut().is_some();
         let whole = tell_end(&args.recording, failure, feed.recorded.cut(), rows_read, until_s);
         let whole = if rows_read == 0 { whole.map(|()| Ok(()))? } else { whole };
         let stop = ended?;
@@ -322,7 +323,7 @@ impl Play {
         if let Stop::Signal(_) = stop {
             return Ok(stop.conclude());
         }
-        let is_unexpected = args.expect_same && !difference.is_none();
+        let is_unexpected = args.expect_same && (is_cut || !difference.is_none());
         Ok(if is_unexpected { ExitCode::from(EXIT_DIFFERENT) } else { ExitCode::SUCCESS })
     }
 }

@@ -19,6 +19,8 @@ use crate::shown::Shown;
 use io_driver::say::say;
 use rt_core::limits;
 use std::collections::VecDeque;
+use std::ffi::OsStr;
+use std::os::unix::fs::MetadataExt;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -61,6 +63,8 @@ pub struct Snapshots {
 enum Work {
     /// A picture, and where to.
     Picture(Box<Moment>, PathBuf),
+    /// One of a film: a name that leads to another file ends.
+    Frame(Box<Moment>, PathBuf),
     /// Another scene goes on.
     Scene(Box<Stage>),
 }
@@ -76,6 +80,8 @@ pub struct Drawn {
     pub left_out: u64,
     /// Single pictures whose time did not come.
     pub not_reached: usize,
+    /// Pictures of an earlier, longer film in the same directory.
+    pub older: usize,
     /// Pictures that a fault cost.
     pub missing: u64,
     /// Fault that has been told: a file that could not be written, a limit, a machine that cannot draw.
@@ -93,6 +99,9 @@ impl std::fmt::Display for Drawn {
         }
         if self.not_reached > 0 {
             write!(f, ", {} NOT TAKEN: the run ended before", self.not_reached)?;
+        }
+        if self.older > 0 {
+            write!(f, ", {} OLDER ones of another film behind them", self.older)?;
         }
         if self.missing > 0 {
             write!(f, ", {} MISSING", self.missing)?;
@@ -181,7 +190,7 @@ impl Snapshots {
             let file = directory.join(format!("frame-{:06}.png", self.due));
             self.due += 1;
             let moment = self.moments.moment(row, bodies, placed);
-            self.give_to_film(Work::Picture(Box::new(moment), file));
+            self.give_to_film(Work::Frame(Box::new(moment), file));
         }
     }
 
@@ -259,7 +268,8 @@ impl Snapshots {
         let drawn = self.thread.take().map_or_else(Drawn::default, |thread| self.wait_for(thread));
         let failure = self.given_up.or(drawn.failure);
         let missing = if failure.is_some() { self.asked.saturating_sub(drawn.written) } else { 0 };
-        Drawn { left_out: self.left_out, not_reached: self.shots.len(), missing, failure, ..drawn }
+        let older = self.film.as_ref().map_or(0, |film| older_frames(film, self.due));
+        Drawn { left_out: self.left_out, not_reached: self.shots.len(), older, missing, failure, ..drawn }
     }
 
     fn wait_for(&mut self, thread: JoinHandle<Drawn>) -> Drawn {
@@ -339,20 +349,44 @@ fn draw_all(
                 }
             }
         }
-        match work.recv() {
-            Ok(Work::Scene(stage)) => next = Some(*stage),
-            Ok(Work::Picture(moment, file)) => {
-                let Some(Drawer { studio, camera, eyes }) = &mut drawer else { continue };
-                drawn.renderer = studio.renderer().to_owned();
-                let picture = studio.take(&moment, camera, eyes);
-                steps.take();
-                drawn.note(&file, picture.save(&file));
-                written.store(drawn.written, Ordering::Relaxed);
-                steps.take();
+        let (moment, file) = match work.recv() {
+            Ok(Work::Scene(stage)) => {
+                next = Some(*stage);
+                continue;
+            }
+            Ok(Work::Picture(moment, file)) => (moment, file),
+            Ok(Work::Frame(moment, file)) => {
+                end_link(&file);
+                (moment, file)
             }
             Err(_) => return drawn,
-        }
+        };
+        let Some(Drawer { studio, camera, eyes }) = &mut drawer else { continue };
+        drawn.renderer = studio.renderer().to_owned();
+        let picture = studio.take(&moment, camera, eyes);
+        steps.take();
+        drawn.note(&file, picture.save(&file));
+        written.store(drawn.written, Ordering::Relaxed);
+        steps.take();
     }
+}
+
+/// A name of a picture that is a link, or one of several names of a file, is that no more: a film has files of its own, and what
+/// it led to may be what is drawn.
+fn end_link(file: &Path) {
+    let Ok(found) = std::fs::symlink_metadata(file) else { return };
+    if found.is_symlink() || found.is_file() && found.nlink() > 1 {
+        // Whoever may not do that is told when the picture cannot be written.
+        let _ = std::fs::remove_file(file);
+    }
+}
+
+/// Pictures of an earlier film that lie behind those of this one.
+fn older_frames(film: &Film, due: u64) -> usize {
+    let Ok(entries) = std::fs::read_dir(&film.directory) else { return 0 };
+    let number =
+        |name: &OsStr| name.to_str()?.strip_prefix("frame-")?.strip_suffix(".png")?.parse::<u64>().ok();
+    entries.flatten().filter(|entry| number(&entry.file_name()).is_some_and(|number| number >= due)).count()
 }
 
 impl Drawn {
@@ -381,7 +415,7 @@ mod tests {
             while turns.bounded_recv().is_ok()
                 && let Ok(work) = work.bounded_recv()
             {
-                drawn.written += u64::from(matches!(work, Work::Picture(..)));
+                drawn.written += u64::from(matches!(work, Work::Picture(..) | Work::Frame(..)));
                 written.store(drawn.written, Ordering::Relaxed);
                 steps.take();
             }

@@ -6,6 +6,7 @@ mod clearing;
 mod commission;
 mod emergency;
 mod emulate;
+mod enter;
 mod held_sockets;
 mod lease_end;
 mod listeners;

@@ -40,6 +40,7 @@
 #include <linux/futex.h>
 #include <poll.h>
 #include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
 #include <sys/mman.h>
 #include <sys/socket.h>
@@ -503,9 +504,8 @@ static inline int phantom_end_lease(const char *path, const char *name, char *er
     return phantom_ask(path, &request, error);
 }
 
-/* Sends a datagram to the driver's stop socket, which lies beside its own: whatever comes there stops the motors, and
- * no connection is needed for it. Never waits. 0: it is on its way. */
-static inline int phantom_send_stop(const char *path) {
+/* Sends a datagram to the stop socket beside `path`. 0: it is on its way; 1: the queue is full; -1: nobody is there. */
+static inline int phantom_send_stop_beside(const char *path) {
     static const char suffix[] = ".stop";
     struct sockaddr_un address;
     size_t length = strlen(path);
@@ -518,19 +518,34 @@ static inline int phantom_send_stop(const char *path) {
     if (sender < 0) return -1;
     ssize_t sent = sendto(sender, "stop", 4, MSG_DONTWAIT | MSG_NOSIGNAL, (const struct sockaddr *)&address,
                           sizeof address);
-    /* A queue that is full is full of stops. */
-    int is_on_its_way = sent >= 0 || errno == EAGAIN || errno == EWOULDBLOCK;
+    int is_full = sent < 0 && (errno == EAGAIN || errno == EWOULDBLOCK);
     close(sender);
-    return is_on_its_way ? 0 : -1;
+    return sent >= 0 ? 0 : is_full ? 1 : -1;
 }
 
-/* Asks the driver to switch all motors off at once; they stay off until phantom_clear_fault. By datagram, or, where the
- * driver has no stop socket, over a connection. 0: the driver is told; a frame of state PHANTOM_DRIVER_STATE_FAULT tells
- * that it is done. -1: see `error`. */
+/* Sends a datagram to the driver's stop socket, which lies beside its own: whatever comes there stops the motors, and
+ * no connection is needed for it. Where `path` is a link, also to what lies beside its target, which counts for more. Never
+ * waits. 0: it is on its way; 1: the queue is full of stops, perhaps of others only; -1: nobody is there. */
+static inline int phantom_send_stop(const char *path) {
+    int sent = phantom_send_stop_beside(path);
+    char *target = realpath(path, NULL);
+    if (target != NULL && strcmp(target, path)) {
+        int beside_target = phantom_send_stop_beside(target);
+        if (beside_target >= 0) sent = beside_target;
+    }
+    free(target);
+    return sent;
+}
+
+/* Asks the driver to switch all motors off at once; they stay off until phantom_clear_fault. By datagram, which a driver
+ * hears whose service is stuck and which is sent before anything waits, and over a connection, by which the driver knows
+ * whose stop it is. 0: the driver has heard it, or the datagram is on its way to whoever listens beside its socket; a
+ * frame of state PHANTOM_DRIVER_STATE_FAULT tells that it is done. -1: see `error`. */
 static inline int phantom_emergency_stop(const char *path, const char *name, char *error) {
-    if (!phantom_send_stop(path)) return 0;
+    int sent = phantom_send_stop(path);
     PhantomRequest request = phantom_request(PHANTOM_REQUEST_KIND_EMERGENCY_STOP, name);
-    return phantom_ask(path, &request, error);
+    int asked = phantom_ask(path, &request, error);
+    return sent == 0 ? 0 : asked;
 }
 
 #endif /* PHANTOM3_CLIENT_H */

@@ -231,20 +231,17 @@ pub fn clear_fault_as_of(asked_ns: u64, socket: &Path, name: &str) -> Result<(),
     exchange(socket, &request).map(|_| ())
 }
 
-/// Asks the driver to switch all motors off at once: by datagram, which a driver hears whose service is stuck, and over
-/// a connection where none was taken. They stay off until [`clear_fault`]. That it was asked does not say that it was done: a frame tells,
-/// and a fault that is to be left is to be waited for first.
+/// Asks the driver to switch all motors off at once: by datagram, which a driver hears whose service is stuck and which is
+/// sent before anything waits, and over a connection, by which the driver knows whose stop it is. They stay off until
+/// [`clear_fault`]. That it was asked does not say that it was done: a frame tells, and a fault that is to be left is to be
+/// waited for first.
 ///
 /// # Errors
-/// Why it could be asked in neither way.
+/// Why it could be asked in neither way. A queue that is full of datagrams, perhaps of others only, is no way.
 pub fn emergency_stop(socket: &Path, name: &str) -> Result<(), AttachError> {
     let sent = stop_socket::send(socket);
-    if matches!(sent, Ok(Sent::Queued)) {
-        return Ok(());
-    }
     let asked = emergency_stop_over_connection(socket, name);
-    // Stops of others are on their way.
-    if sent.is_ok() { Ok(()) } else { asked.map(drop) }
+    if matches!(sent, Ok(Sent::Queued)) { Ok(()) } else { asked.map(drop) }
 }
 
 /// The same over a connection alone. The answer says that the driver has heard it, and, of a driver that tells, the tick

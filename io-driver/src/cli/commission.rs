@@ -1,5 +1,6 @@
 //! `io-driver commission`.
 
+use super::enter::{Entered, wait_for_enter};
 use super::places::SocketArgs;
 use super::zero::Zeroing;
 use super::{EXIT_FAULT, EXIT_USAGE, fail};
@@ -14,7 +15,6 @@ use clap::Args;
 use rt_core::signals::StopSignals;
 use shm_abi::client;
 use std::error::Error;
-use std::io::BufRead;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
@@ -84,14 +84,14 @@ fn commission(args: &CommissionArgs) -> Result<bool, Failure> {
     let mut all_right = true;
     if !args.motors_only {
         for axis in 0..3 {
-            all_right &= try_axis(args, &mut session, axis).map_err(during)?;
+            all_right &= try_axis(args, &signals, &mut session, axis).map_err(during)?;
         }
         if !all_right {
             say("Set the counters right first; the motors are compared with them.");
             return Ok(false);
         }
     }
-    prompt(args, "Now the motors. Hold the tip loosely and still, so that the arm's weight does not move it, and stay clear of the rest").map_err(during)?;
+    prompt(args, &signals, "Now the motors. Hold the tip loosely and still, so that the arm's weight does not move it, and stay clear of the rest").map_err(during)?;
     let kinematics = arm_file.mechanism;
     let per_count = arm_file.joint_map().rad_per_count();
     let tell = |joint: usize| say(&format!("  {} ...", JOINTS[joint]));
@@ -129,8 +129,13 @@ fn prepare(
 /// How long a person may take to bring an arm into its zeroing pose (s).
 const UNTIL_REST_S: f64 = 300.0;
 
-fn try_axis(args: &CommissionArgs, session: &mut Session<'_>, axis: usize) -> Result<bool, Box<dyn Error>> {
-    prompt(args, &format!("Then move the tip 5 cm {}", AXES[axis]))?;
+fn try_axis(
+    args: &CommissionArgs,
+    signals: &StopSignals,
+    session: &mut Session<'_>,
+    axis: usize,
+) -> Result<bool, Box<dyn Error>> {
+    prompt(args, signals, &format!("Then move the tip 5 cm {}", AXES[axis]))?;
     let verdict = session.check_by_hand(axis)?;
     say(&match verdict {
         HandVerdict::Right => format!("{}: right", AXES[axis]),
@@ -187,15 +192,16 @@ fn describe(config: &DriverConfig, device: usize) -> Result<ArmFile, Box<dyn Err
     }
 }
 
-fn prompt(args: &CommissionArgs, what: &str) -> Result<(), Box<dyn Error>> {
+fn prompt(args: &CommissionArgs, signals: &StopSignals, what: &str) -> Result<(), Box<dyn Error>> {
     if args.yes {
         say(what);
         return Ok(());
     }
     say(&format!("Press Enter. {what}."));
-    match std::io::stdin().lock().lines().next() {
-        Some(line) => line.map(drop).map_err(Into::into),
-        None => Err("standard input has ended; --yes goes on without it".into()),
+    match wait_for_enter(signals)? {
+        Entered::Line => Ok(()),
+        Entered::Stopped => Err(SessionError::Interrupted.into()),
+        Entered::NoInput => Err("standard input has ended; --yes goes on without it".into()),
     }
 }
 

@@ -6,6 +6,7 @@
 //! Invariants: no exit status of 0 without frames that show the zero. A driver that does not show within [`PROMPT`] what
 //! is waited for is told of then, whatever we wait in.
 
+use super::enter::{Entered, wait_for_enter};
 use super::places::SocketArgs;
 use super::prompt::{PROMPT, PromptWords, say_if_late};
 use super::{EXIT_FAULT, EXIT_USAGE, fail};
@@ -22,7 +23,7 @@ use shm_abi::frame::{DEVICE_NOT_ZEROED, DEVICE_POSITION_VALID};
 use shm_abi::peer::ProcessWords;
 use shm_abi::{DeviceFrame, DriverState, DriverView, FaultReason, Frame};
 use std::borrow::Cow;
-use std::io::{BufRead, IsTerminal, Write};
+use std::io::{IsTerminal, Write};
 use std::path::Path;
 use std::process::ExitCode;
 use std::time::{Duration, Instant};
@@ -202,12 +203,11 @@ impl<'a> Zeroing<'a> {
         }
         if !yes {
             say("Press Enter when it is there.");
-            std::io::stdin()
-                .lock()
-                .lines()
-                .next()
-                .ok_or(ZeroError::NoInput)?
-                .map_err(|_| ZeroError::NoInput)?;
+            match wait_for_enter(self.signals) {
+                Ok(Entered::Line) => {}
+                Ok(Entered::Stopped) => return Err(ZeroError::Interrupted),
+                Ok(Entered::NoInput) | Err(_) => return Err(ZeroError::NoInput),
+            }
         }
         self.wait_for_rest(devices, wait_s)?;
         let before = self.frame;

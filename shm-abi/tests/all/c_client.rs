@@ -7,7 +7,9 @@ use patience::limit;
 use patience::prelude::*;
 use shm_abi::handshake::{Answer, Verdict};
 use shm_abi::server::{Server, ServerEvent};
+use shm_abi::stop_socket::Sent;
 use shm_abi::{Command, CommanderView, DriverMemory};
+use std::os::unix::net::UnixDatagram;
 use std::path::{Path, PathBuf};
 use std::process::{Child, Output, Stdio};
 use std::sync::OnceLock;
@@ -68,25 +70,24 @@ struct Driver {
     memory: DriverMemory,
     server: Server,
     events: Vec<ServerEvent>,
-    _directory: tempfile::TempDir,
+    directory: tempfile::TempDir,
 }
 
 impl Driver {
     fn start() -> Self {
         let directory = tempfile::tempdir().unwrap();
         let server = Server::bind(&directory.path().join("driver.sock")).unwrap();
-        Self {
-            memory: DriverMemory::create(&info()).unwrap(),
-            server,
-            events: Vec::new(),
-            _directory: directory,
-        }
+        Self { memory: DriverMemory::create(&info()).unwrap(), server, events: Vec::new(), directory }
     }
 
     /// `None` without a compiler.
     fn client(&self, arguments: &[&str]) -> Option<Child> {
+        self.client_at(self.server.path(), arguments)
+    }
+
+    fn client_at(&self, socket: &Path, arguments: &[&str]) -> Option<Child> {
         let mut program = std::process::Command::new(compiled()?);
-        program.arg(self.server.path()).args(arguments).stdout(Stdio::piped()).stderr(Stdio::piped());
+        program.arg(socket).args(arguments).stdout(Stdio::piped()).stderr(Stdio::piped());
         Some(program.spawn().unwrap())
     }
 
@@ -188,17 +189,64 @@ fn a_c_program_stops_the_driver_and_its_motors_clears_faults_and_zeroes() {
     }
 }
 
-#[test]
-fn a_c_program_stops_the_motors_by_datagram_where_the_driver_has_a_socket_for_it() {
-    let mut driver = Driver::start();
-    let place = format!("{}.stop", driver.server.path().display());
-    let stops = std::os::unix::net::UnixDatagram::bind(place).unwrap();
+/// A stop socket at which nobody takes anything.
+fn stops_beside(socket: &Path) -> UnixDatagram {
+    let stops = UnixDatagram::bind(shm_abi::stop_socket::path_beside(socket)).unwrap();
     stops.set_nonblocking(true).unwrap();
+    stops
+}
+
+fn is_stopped(events: &[ServerEvent]) -> bool {
+    matches!(events, [ServerEvent::EmergencyStopRequested { .. }])
+}
+
+#[test]
+fn a_c_program_stops_the_motors_by_datagram_and_over_a_connection() {
+    let mut driver = Driver::start();
+    let stops = stops_beside(driver.server.path());
     let Some(client) = driver.client(&["ask", "emergency-stop"]) else { return };
     let output = driver.serve_until_it_ends(client);
     assert!(output.status.success(), "{output:?}");
     assert!(stops.recv(&mut [0; 16]).is_ok(), "nothing came");
-    assert!(driver.events.is_empty(), "and no connection was needed: {:?}", driver.events);
+    assert!(is_stopped(&driver.events), "{:?}", driver.events);
+}
+
+#[test]
+fn a_c_program_stops_a_driver_whose_service_is_stuck_by_datagram() {
+    let driver = Driver::start();
+    let stops = stops_beside(driver.server.path());
+    let Some(client) = driver.client(&["ask", "emergency-stop"]) else { return };
+    let output = client.bounded_output();
+    assert!(output.status.success(), "{output:?}");
+    assert!(stops.recv(&mut [0; 16]).is_ok(), "nothing came");
+}
+
+/// Else others alone could undo it.
+#[test]
+fn a_stop_of_a_c_program_that_the_queue_has_no_room_for_is_heard_over_the_connection() {
+    let mut driver = Driver::start();
+    let _stops = stops_beside(driver.server.path());
+    while shm_abi::stop_socket::send(driver.server.path()).unwrap() == Sent::Queued {}
+    let Some(client) = driver.client(&["ask", "emergency-stop"]) else { return };
+    let output = driver.serve_until_it_ends(client);
+    assert!(output.status.success() && is_stopped(&driver.events), "{output:?}: {:?}", driver.events);
+    // Nobody answers.
+    let Some(client) = driver.client(&["ask", "emergency-stop"]) else { return };
+    assert_eq!(client.bounded_output().status.code(), Some(1));
+}
+
+#[test]
+fn a_c_program_stops_a_driver_through_a_link_whoever_listens_beside_that() {
+    let mut driver = Driver::start();
+    let stops = stops_beside(driver.server.path());
+    let link = driver.directory.path().join("elsewhere.sock");
+    std::os::unix::fs::symlink(driver.server.path(), &link).unwrap();
+    let stranger = stops_beside(&link);
+    let Some(client) = driver.client_at(&link, &["ask", "emergency-stop"]) else { return };
+    let output = driver.serve_until_it_ends(client);
+    assert!(output.status.success() && is_stopped(&driver.events), "{output:?}: {:?}", driver.events);
+    assert!(stops.recv(&mut [0; 16]).is_ok(), "nothing came");
+    assert!(stranger.recv(&mut [0; 16]).is_ok(), "it may be the driver's as well");
 }
 
 #[test]

@@ -130,3 +130,16 @@ fn a_program_that_stops_a_driver_whose_service_is_stuck_is_heard() {
     shm_abi::client::emergency_stop(server.path(), "test").unwrap();
     assert!(told.recv_timeout(limit()).is_ok());
 }
+
+/// Else others alone could undo it.
+#[test]
+fn a_stop_that_the_queue_has_no_room_for_counts_only_when_the_driver_has_heard_it() {
+    let directory = tempfile::tempdir().unwrap();
+    let server = Server::bind(&directory.path().join("driver.sock")).unwrap();
+    let (_socket, _file) = StopSocket::bind(server.path()).unwrap();
+    while stop_socket::send(server.path()).unwrap() == Sent::Queued {}
+    assert!(matches!(
+        shm_abi::client::emergency_stop(server.path(), "test"),
+        Err(shm_abi::client::AttachError::NoAnswer { .. })
+    ));
+}

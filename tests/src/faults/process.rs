@@ -46,6 +46,12 @@ impl Running {
         Self { child, heard: String::new() }
     }
 
+    /// Starts it with a standard input of one's own, which goes on until what is behind it ends.
+    pub fn start_reading(command: &mut Command, input: impl Into<Stdio>) -> Self {
+        let child = spawn(command.stdout(Stdio::piped()).stderr(Stdio::piped()).stdin(input));
+        Self { child, heard: String::new() }
+    }
+
     /// Its process id.
     pub fn id(&self) -> u32 {
         self.child.id()

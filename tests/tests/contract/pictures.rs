@@ -116,6 +116,32 @@ fn a_film_has_a_picture_for_each_of_its_moments() {
 }
 
 #[test]
+fn a_film_ends_links_in_its_directory_and_tells_what_an_earlier_one_left_there() {
+    let place = place();
+    std::fs::create_dir(place.path("film")).expect("a directory");
+    let frame = |number: u32| place.path(&format!("film/frame-{number:06}.png"));
+    for (number, name) in [(0, "mine"), (1, "yours"), (3, "old"), (7, "older")] {
+        std::fs::write(place.path(name), name).expect("a file");
+        match number {
+            0 => std::fs::hard_link(place.path(name), frame(0)).expect("a link"),
+            1 => std::os::unix::fs::symlink(place.path(name), frame(1)).expect("a link"),
+            _ => std::fs::write(frame(number), name).expect("a picture"),
+        }
+    }
+    let film = ["--frames", "film", "--fps", "10", "--picture-size", "32x32"];
+    let said =
+        place.run(["run", "scene.toml", "--clock", "virtual", "--seconds", "0.3"].into_iter().chain(film));
+    if are_missing(&said) {
+        return;
+    }
+    assert_eq!(said.status, Some(0), "{}", said.err);
+    assert!(said.out.contains(", 2 OLDER ones of another film behind them"), "{}", said.out);
+    let read = |name: &str| std::fs::read(place.path(name)).expect(name);
+    assert_eq!((&read("mine")[..], &read("yours")[..]), (&b"mine"[..], &b"yours"[..]));
+    (0..3).for_each(|number| assert_eq!(size(&std::fs::read(frame(number)).expect("a picture")), [32; 2]));
+}
+
+#[test]
 fn what_cannot_be_drawn_or_written_is_told() {
     let place = place();
     let run = |more: &[&str]| {

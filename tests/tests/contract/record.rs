@@ -234,6 +234,47 @@ fn a_killed_process_leaves_all_but_the_last_half_second() {
     }
 }
 
+/// The file without one of its chunks, and without the check sum of all, as tools that filter leave it.
+fn without_chunk(whole: &[u8], which: usize) -> Vec<u8> {
+    const MAGIC: usize = 8;
+    let (mut left, mut at, mut chunks) = (whole[..MAGIC].to_vec(), MAGIC, 0);
+    loop {
+        let length = u64::from_le_bytes(whole[at + 1..at + 9].try_into().expect("eight bytes")) as usize;
+        let record = &whole[at..at + 9 + length];
+        at += record.len();
+        match record[0] {
+            0x06 => {
+                if chunks != which {
+                    left.extend(record);
+                }
+                chunks += 1;
+            }
+            // The end of the data; behind it a footer without a summary.
+            0x0f => {
+                left.extend([&record[..9], &[0; 4]].concat());
+                left.extend([&[0x02, 20, 0, 0, 0, 0, 0, 0, 0][..], &[0; 20], &whole[..MAGIC]].concat());
+                assert!(chunks > which, "{chunks} chunks");
+                return left;
+            }
+            _ => left.extend(record),
+        }
+    }
+}
+
+#[test]
+fn a_recording_without_one_of_its_chunks_is_not_whole() {
+    let (place, _) = workplace("default");
+    ran(&place, &["run", "scene.toml", "--clock", "virtual", "--seconds", "3", "--record", "r.mcap"]);
+    let whole = bytes(&place, "r.mcap");
+    for which in [3, 5] {
+        place.write("less.mcap", &without_chunk(&whole, which));
+        let said = place.run(["export", "less.mcap", "--csv", "left.csv"]);
+        assert!(said.err.contains("its end tells of 3000 rows, of which"), "{}", said.err);
+        let said = place.run(["replay", "less.mcap", "--expect-same"]);
+        assert_ne!(said.status, Some(0), "{}{}", said.out, said.err);
+    }
+}
+
 #[test]
 fn a_recording_that_was_cut_anywhere_is_read_up_to_there() {
     let (place, _) = workplace("default");

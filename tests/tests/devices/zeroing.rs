@@ -261,6 +261,22 @@ fn whoever_interrupts_a_zero_that_was_asked_for_is_not_told_that_nothing_was_zer
 }
 
 #[test]
+fn one_signal_ends_the_wait_for_enter() {
+    let stand = Stand::start(asking("real"));
+    let (input, _held) = std::io::pipe().unwrap();
+    let mut command = programs::io_driver();
+    command.args(["zero", "--socket"]).arg(stand.socket());
+    let mut zeroing = Running::start_reading(&mut command, input);
+    let lines = zeroing.take_lines();
+    while !lines.recv_timeout(Duration::from_secs(30)).expect("it asks").contains("Press Enter") {}
+    zeroing.signal(rustix::process::Signal::INT);
+    let end = zeroing.end();
+    assert_eq!(end.status, Some(3), "{end:?}");
+    assert!(end.err.contains("interrupted; nothing was zeroed"), "{end:?}");
+    stand.finish();
+}
+
+#[test]
 fn a_jump_costs_the_zero_and_clearing_the_fault_leads_to_zeroing() {
     for zeroing in ["ask", "at-start"] {
         let stand = Stand::start(Setup { zeroing, ..Setup::new("real") });

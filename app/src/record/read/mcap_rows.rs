@@ -6,7 +6,7 @@ use super::tick_order::{TickOrder, check_period};
 use super::{ReadError, check_text};
 use crate::columns::Names;
 use crate::record::about::{About, InputFile, MOST_FILE_BYTES, names_of};
-use crate::record::mcap_file::{ABOUT, COLUMNS, ORDER_TOPIC, TICK_TOPIC};
+use crate::record::mcap_file::{ABOUT, COLUMNS, END, ORDER_TOPIC, TICK_TOPIC};
 use crate::record::schema::order;
 use crate::record::tick;
 use crate::record::wire::each_field;
@@ -200,6 +200,7 @@ impl McapRows {
                 return Ok(Found::Row(Box::new(row), bodies));
             }
             Kept::Facts(name, facts) if name == ABOUT || name == COLUMNS => self.take_facts(&name, facts)?,
+            Kept::Facts(name, facts) if name == END => self.end(&facts)?,
             Kept::Chunk(Ok(records)) => self.chunk = OpenChunk { records, at: 0 },
             Kept::Chunk(Err(ChunkError::Damage(why))) => return Err(self.damaged(&why)),
             Kept::Chunk(Err(ChunkError::Memory)) => {
@@ -234,6 +235,23 @@ impl McapRows {
             self.about.facts = facts;
         }
         self.names = names.unwrap_or_else(|| std::mem::take(&mut self.names));
+        Ok(())
+    }
+
+    /// Takes what its end tells of it: rows may have been taken out of the middle.
+    fn end(&mut self, facts: &Facts) -> Result<(), ReadError> {
+        let Some(told) = facts.get("rows") else { return Ok(()) };
+        match told.parse::<u64>() {
+            Ok(told) if told == self.rows => {}
+            Ok(told) if told > self.rows => {
+                let missing = told - self.rows;
+                self.cut = Some(format!("its end tells of {told} rows, of which {missing} are missing"));
+            }
+            _ => {
+                let why = format!("its end tells of {} rows", beginning(told));
+                return Err(self.damaged(&why));
+            }
+        }
         Ok(())
     }
 
