@@ -43,6 +43,8 @@ struct Segment {
 #[derive(Debug, Clone, Copy, Default)]
 struct Triangle {
     corners: [Vector3<f64>; 3],
+    /// The box around it.
+    bounds: [Vector3<f64>; 2],
     normal: Vector3<f64>,
     offset_m: f64,
     number: u32,
@@ -183,6 +185,10 @@ fn region(
     Some(Region { normal_M, on_mesh_M, depth_m, radius_m, face })
 }
 
+fn are_apart([low, high]: &[Vector3<f64>; 2], [other_low, other_high]: &[Vector3<f64>; 2]) -> bool {
+    (0..3).any(|axis| low[axis] > other_high[axis] || high[axis] < other_low[axis])
+}
+
 impl Triangles {
     fn of(
         mesh: &Mesh,
@@ -194,14 +200,14 @@ impl Triangles {
         for (number, face) in mesh.faces().iter().enumerate() {
             let corners = face.vertices.map(|vertex| vertices[vertex as usize]);
             let [a, b, c] = &corners;
-            let (least, most) = (a.inf(b).inf(c), a.sup(b).sup(c));
-            if (0..3).any(|axis| least[axis] > high[axis] || most[axis] < low[axis]) {
+            let bounds = [a.inf(b).inf(c), a.sup(b).sup(c)];
+            if are_apart(&bounds, &[*low, *high]) {
                 continue;
             }
             let normal = turn(&face.normal_B);
             let offset_m = normal.dot(a);
             *triangles.all.get_mut(triangles.count)? =
-                Triangle { corners, normal, offset_m, number: number as u32 };
+                Triangle { corners, bounds, normal, offset_m, number: number as u32 };
             triangles.count += 1;
         }
         Some(triangles)
@@ -219,6 +225,9 @@ impl Triangle {
 
     /// The segment that two have in common, along `own normal x other normal`.
     fn crosses(&self, other: &Self) -> Option<[Vector3<f64>; 2]> {
+        if are_apart(&self.bounds, &other.bounds) {
+            return None;
+        }
         let heights = [self.heights_m(other), other.heights_m(self)];
         let is_aside =
             |heights: &[f64; 3]| heights.iter().all(|at| *at > 0.0) || heights.iter().all(|at| *at <= 0.0);
@@ -262,7 +271,7 @@ const ALONG: f64 = 0.6;
 /// Of a mesh that is coarse.
 const MOST_VERTICES: usize = 1024;
 /// Of either, near the other.
-const MOST_TRIANGLES: usize = 128;
+const MOST_TRIANGLES: usize = 256;
 const MOST_SEGMENTS: usize = 128;
 const MOST_REGIONS: usize = 4;
 /// Ends of segments of one loop are nearer to each other, in extents.
