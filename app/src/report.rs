@@ -129,8 +129,8 @@ impl fmt::Display for Report {
         if tally.cuts > 0 {
             writeln!(
                 f,
-                "cut          {} times a force rose or turned though nothing moved for it, by up to {:.1} N; please \
-                 tell us",
+                "cut          {} times a force rose or turned though nothing moved for it, by up to {:.1} N: where a push \
+                 has two ways out, or by a fault; the events say when",
                 tally.cuts, tally.most_cut_n
             )?;
         }

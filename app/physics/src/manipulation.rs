@@ -24,7 +24,7 @@ pub use room::{Room, Wanted};
 use arrival::Arrival;
 use departure::Departure;
 use driven::Driven;
-use haptics::{Entity, Shape};
+use haptics::{Entity, Form, Shape};
 use nalgebra::Vector3;
 
 use crate::anchor::Anchor;
@@ -35,7 +35,7 @@ use crate::contacts::Contacts;
 use crate::error::BodyError;
 use crate::hand::{FingerSettings, FingerTick, Hand};
 use crate::integrator::Gets;
-use crate::pairs::{Pairs, Who};
+use crate::pairs::{Key, Pairs, Who};
 use crate::pull::{MAX_PULLS, Pull};
 use crate::roster::Roster;
 use crate::settings::Settings;
@@ -101,11 +101,11 @@ const MAX_TOUCHES: usize = 64;
 /// Contact points between entities that have room at first, or so many of each body if that is more; until there is
 /// [more](room) others are left out, and counted. A quarter is for those with what does not move: nothing falls through a floor
 /// for want of room.
-const ROWS: usize = 8192;
-const ROWS_OF_BODY: usize = 8;
+const ROWS: usize = 2048;
+const ROWS_OF_BODY: usize = 4;
 /// Pairs of entities near each other that have room at first, or so many of each body if that is more, likewise.
-const PAIRS: usize = 4096;
-const PAIRS_OF_BODY: usize = 3;
+const PAIRS: usize = 1024;
+const PAIRS_OF_BODY: usize = 2;
 
 impl Manipulation {
     /// The entities of these numbers are bodies; all others are fixed.
@@ -113,18 +113,29 @@ impl Manipulation {
     /// # Errors
     /// A body whose contact points nobody can find.
     pub fn new(entities: &[Entity], bodies: &[(usize, Body)], settings: Settings) -> Result<Self, BodyError> {
-        if let Some((entity, _)) = bodies.iter().find(|(entity, _)| !can_move(&entities[*entity].shape)) {
-            return Err(BodyError::NoContactPoints { shape: collide::name(&entities[*entity].shape) });
-        }
-        Ok(Self::of(entities, bodies, settings))
+        check(entities, bodies)?;
+        Ok(Self::of(entities, bodies, settings, true))
+    }
+
+    /// The same of bodies that somebody else steps, all of them.
+    ///
+    /// # Errors
+    /// As of [`Self::new`].
+    pub fn of_those_elsewhere(
+        entities: &[Entity],
+        bodies: &[(usize, Body)],
+        settings: Settings,
+    ) -> Result<Self, BodyError> {
+        check(entities, bodies)?;
+        Ok(Self::of(entities, bodies, settings, false))
     }
 
     /// Nothing moves; where the entities are is known all the same.
     pub fn of_none(entities: &[Entity]) -> Self {
-        Self::of(entities, &[], Settings::default())
+        Self::of(entities, &[], Settings::default(), true)
     }
 
-    fn of(entities: &[Entity], bodies: &[(usize, Body)], settings: Settings) -> Self {
+    fn of(entities: &[Entity], bodies: &[(usize, Body)], settings: Settings, are_here: bool) -> Self {
         // Contacts ask for them of each body, and of what is convex.
         let movable = bodies.iter().map(|(entity, _)| (&entities[*entity], true));
         let touched = entities.iter().filter(|_| !bodies.is_empty()).map(|entity| (entity, false));
@@ -179,11 +190,19 @@ impl Manipulation {
             changed: Vec::with_capacity(count),
             has_changed: vec![false; count].into(),
         };
-        for body in 0..count {
-            let who = who(&made.roster, entities, made.contacts);
-            made.pairs.meet(body, &who, &made.broad_phase, true);
+        if are_here {
+            for body in 0..count {
+                let who = who(&made.roster, entities, made.contacts);
+                made.pairs.meet(body, &who, &made.broad_phase, true);
+            }
+            made.make_room(entities);
+            let of_pairs = made.pairs.keys().map(|key| likely_points(key, entities, &made.roster)).sum();
+            if of_pairs > made.room.counts.of_pairs {
+                made.room = Box::new(RowRoom::new(RowCounts { of_pairs, ..made.room.counts }));
+            }
+        } else {
+            made.give_all_away();
         }
-        made.make_room(entities);
         made
     }
 
@@ -270,6 +289,22 @@ impl Manipulation {
         self.keep_up(entities, dt_s);
         self.rest(entities, touches, dt_s);
         Made { rows: self.room.rows.len(), sweeps, residual, unsolved, parked, awake }
+    }
+}
+
+/// Contact points that two are likely to have when they touch.
+fn likely_points(key: &Key, entities: &[Entity], roster: &Roster) -> usize {
+    let both = [roster.entities[key.body as usize], key.entity as usize];
+    let is_round = |entity: usize| matches!(entities[entity].shape, Shape::Form(Form::Sphere(_)));
+    if both.into_iter().any(is_round) { 1 } else { 4 }
+}
+
+fn check(entities: &[Entity], bodies: &[(usize, Body)]) -> Result<(), BodyError> {
+    match bodies.iter().find(|(entity, _)| !can_move(&entities[*entity].shape)) {
+        Some((entity, _)) => {
+            Err(BodyError::NoContactPoints { shape: collide::name(&entities[*entity].shape) })
+        }
+        None => Ok(()),
     }
 }
 

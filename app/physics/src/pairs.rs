@@ -115,8 +115,9 @@ impl Pairs {
     /// How many should have room, if that is more than have: twice as many as are used.
     pub(crate) fn wanted(&self) -> Option<usize> {
         let room = self.pool.len();
-        (room < self.most && 2 * self.unused.len() < room)
-            .then(|| (2 * room).min(self.most).next_multiple_of(pool::CHUNK))
+        let used = room - self.unused.len() + (self.missing as usize).min(room);
+        let wanted = (2 * used).max(room + room / 2).min(self.most).next_multiple_of(pool::CHUNK);
+        (wanted > room && 8 * used > 5 * room).then_some(wanted)
     }
 
     /// Takes more room; what it replaces is left behind. Says whether pairs are missing, which then have to be begun.

@@ -72,11 +72,12 @@ impl Lists {
         settings: Settings,
         lists: ListSettings,
     ) -> Result<Self, BodyError> {
-        let mut fast = Manipulation::new(entities, bodies, settings)?;
-        let mut slow = Manipulation::new(entities, bodies, settings)?.without_those_elsewhere();
         let all_slow = bodies.len() > lists.fast_bodies;
-        let without = if all_slow { &mut fast } else { &mut slow };
-        without.give_all_away();
+        let manipulation = |are_here: bool| {
+            let make = if are_here { Manipulation::new } else { Manipulation::of_those_elsewhere };
+            make(entities, bodies, settings)
+        };
+        let (fast, slow) = (manipulation(!all_slow)?, manipulation(all_slow)?.without_those_elsewhere());
         let (fast_end, slow_end) = link::link(bodies.len());
         Ok(Self {
             fast,

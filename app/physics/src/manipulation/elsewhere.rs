@@ -24,7 +24,7 @@ impl Manipulation {
     }
 
     /// As [`Self::give_away`], all of them.
-    pub fn give_all_away(&mut self) {
+    pub(super) fn give_all_away(&mut self) {
         self.roster.set_all_elsewhere();
         self.pairs.clear();
     }

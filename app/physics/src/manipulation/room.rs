@@ -1,6 +1,6 @@
 //! Room for more pairs and contact points than a scene seemed to need when it was loaded.
 //!
-//! Model: while more than half of its room is used, a manipulation [says](Manipulation::wanted_room) what it should have.
+//! Model: while five eighths of its room are used, a manipulation [says](Manipulation::wanted_room) what it should have.
 //! A thread without deadlines [makes](Wanted::make) it, and between two ticks it is [taken](Manipulation::take_room). Who has
 //! no deadlines does all of it at once ([`Manipulation::make_room`]).
 //! Invariants: taking room allocates nothing and frees nothing. Pairs that had no room begin when there is some.
@@ -90,7 +90,7 @@ impl Manipulation {
         let has = self.room.counts.of_pairs;
         let wants_rows = self.next_room.is_none()
             && has < self.pairs.room() * MAX_POINTS
-            && 2 * self.room.rows.len() > has;
+            && 8 * self.room.rows.len() > 5 * has;
         let wanted = Wanted {
             pairs: self.pairs.wanted().map(|pairs| [pairs, self.pairs.room()]),
             rows: wants_rows.then_some(self.more_rows()),

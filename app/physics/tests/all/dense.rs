@@ -27,21 +27,24 @@ fn block(counts: [usize; 3], size: [f64; 3], apart: f64) -> World {
 fn nothing_falls_through_the_floor_for_want_of_room() {
     // Boxes, each with 26 beside it: fewer than there is room for, and more; and cards, each near all others.
     let blocks = [
-        ([5, 4, 5], [0.04; 3], 5e-4, false),
-        ([8, 6, 8], [0.04; 3], 0.0, true),
-        ([1, 300, 1], [0.04, 5e-5, 0.04], 5e-6, true),
+        ([5, 4, 5], [0.04; 3], 5e-4, false, false),
+        ([8, 6, 8], [0.04; 3], 0.0, false, true),
+        ([8, 6, 8], [0.04; 3], 0.0, true, false),
+        ([1, 300, 1], [0.04, 5e-5, 0.04], 5e-6, true, false),
     ];
-    for (counts, size, apart, is_full) in blocks {
+    for (counts, size, apart, makes_room, is_full) in blocks {
         let mut world = block(counts, size, apart);
-        world.makes_room = false;
+        world.makes_room = makes_room;
         for _ in 0..40 {
             world.step(&[]);
         }
         let lowest = world.manipulation.bodies().iter().map(|body| body.centre_W.y).fold(f64::MAX, f64::min);
         let sunk_m = 0.5 * size[1] - lowest;
         let left_out = world.manipulation.left_out();
-        // By itself it would have fallen by 8 mm. Where contacts are left out things lie in each other, and on the floor.
-        assert!(sunk_m < 0.5 * size[1] && sunk_m < 1e-3, "{counts:?}: {sunk_m} m");
+        // By itself it would have fallen by 8 mm; 300 cards weigh 0.7 mm on the springs of one. Where contacts are left out
+        // things lie in each other, and on the floor.
+        assert!(sunk_m < 1e-3, "{counts:?}: {sunk_m} m");
+        // In the first ticks there is not enough room for so many points.
         assert_eq!(left_out > 0, is_full, "{counts:?}: {left_out}");
     }
 }
