@@ -231,6 +231,39 @@ fn those_with_hollows_get_into_each_other_for_a_while_at_most() {
     assert!(5 * deep <= 2 * all, "{deep} of {all}");
 }
 
+/// A ball with 80 tips, each third of which is long.
+fn spiky() -> TriangleSoup {
+    let mut soup = make::uv_sphere(8, 6, 0.03);
+    let round = std::mem::take(&mut soup.faces);
+    for (at, [a, b, c]) in round.into_iter().enumerate() {
+        let middle = [a, b, c].map(|corner| soup.vertices[corner as usize]).into_iter().sum::<Vector3<f64>>();
+        let tip = soup.vertices.len() as u32;
+        soup.vertices.push(middle.normalize() * if at % 3 == 0 { 0.06 } else { 0.031 });
+        soup.faces.extend([[a, b, tip], [b, c, tip], [c, a, tip]]);
+    }
+    soup
+}
+
+#[test]
+fn a_ball_with_many_tips_rests_on_a_groove_and_not_in_it() {
+    let groove = [[-0.05, -0.03], [0.05, -0.03], [0.05, 0.03], [0.0, -0.02], [-0.05, 0.03]];
+    let groove = meshes::build(meshes::prism(&groove, &[[0, 1, 3], [1, 2, 3], [0, 3, 4]], 0.08));
+    let (ball, noise) = (meshes::build(spiky()), &mut Noise::new(3));
+    for case in 0..16 {
+        let place = Vector3::new(0.0, 0.11, 0.0) + noise.vector(0.02);
+        let entities = [
+            object(groove.clone(), Isometry3::identity(), 1000.0, 0.4),
+            object(ball.clone(), Isometry3::from_parts(place.into(), noise.turn()), 1000.0, 0.4),
+        ];
+        let mut world = world(entities, |body| body);
+        (0..1200).for_each(|_| drop(world.step(&[])));
+        let corners = ball.vertices().iter().map(|at| (world.entities[1].X_WB * Point3::from(*at)).coords);
+        let inside = corners.filter(|at| groove.is_inside(at)).map(|at| groove.nearest(&at).distance_m);
+        let deepest_m = inside.fold(0.0, f64::max);
+        assert!(deepest_m < 5e-4, "{case}: {deepest_m:e} m");
+    }
+}
+
 /// A box with a dent of a millimetre is not convex; it comes down on a cube that is free, with an edge.
 #[test]
 fn meshes_that_are_nearly_convex_hold_as_convex_ones_do() {
