@@ -13,10 +13,10 @@
 
 use nalgebra::Vector3;
 
-use super::Mesh;
 use super::crack::over_ledge;
 use super::place::{Facet, On, Place, Side, previous};
 use super::walk::{Reached, cross_face, plane_through, rim};
+use super::{Mesh, Sides};
 
 /// Goes along the line in which two faces cross: to the target, or to the first of their edges on the way.
 pub(super) fn follow_crossing(
@@ -59,6 +59,7 @@ pub(super) fn meet_others(mesh: &Mesh, place: Place, reached: Reached, hip_B: &V
                 || passed.contains(&number)
                 || face.vertices.iter().any(is_neighbour)
                 || is_parallel()
+                || leaves_sheet(mesh, place.at(), &way_B, number)
         };
         let Some(hit) = mesh.first_hit_of_others(&place.point_B, &reached.place().point_B, is_skipped) else {
             break;
@@ -82,6 +83,19 @@ pub(super) fn meet_others(mesh: &Mesh, place: Place, reached: Reached, hip_B: &V
         passed[passing] = hit.face;
     }
     reached
+}
+
+/// Whether a way that begins where two faces cross leads away from this one, on its side, as a sheet or a neighbour of it: whoever
+/// goes that way has come from there, and its other side is not met.
+pub(super) fn leaves_sheet(mesh: &Mesh, at: On, way_B: &Vector3<f64>, number: u32) -> bool {
+    let On::Crossing(one, other) = at else { return false };
+    let face = &mesh.faces[number as usize];
+    let is_left = |side: Side| {
+        let vertices = &mesh.faces[side.face as usize].vertices;
+        let is_there = side.face == number || face.vertices.iter().any(|vertex| vertices.contains(vertex));
+        is_there && Facet::of(mesh, Side { face: number, ..side }).normal_B.dot(way_B) >= 0.0
+    };
+    face.sides == Sides::Sheet && (is_left(one) || is_left(other))
 }
 
 /// Of the faces that meet at an edge or a vertex, the one into which the line leads, towards the HIP, in which `other` crosses

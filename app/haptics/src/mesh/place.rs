@@ -72,6 +72,11 @@ impl Place {
         Self::new(nearest.point_B, on)
     }
 
+    /// The feature that it lies on.
+    pub(super) fn at(&self) -> On {
+        self.at
+    }
+
     /// A face that it lies on.
     pub(crate) fn face(&self) -> u32 {
         self.on.side().face

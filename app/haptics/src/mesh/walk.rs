@@ -32,7 +32,7 @@ use nalgebra::Vector3;
 use super::Mesh;
 use super::bvh::Leaving;
 use super::crack::{self, Beyond};
-use super::crossing::{follow_crossing, meet_others, plane_at_crossing};
+use super::crossing::{follow_crossing, leaves_sheet, meet_others, plane_at_crossing};
 use super::draw::{Draw, Drawn};
 use super::facing::facing;
 use super::ledge::off_ledge;
@@ -283,19 +283,22 @@ fn fly(mesh: &Mesh, place: Place, hip_B: Vector3<f64>) -> Option<Place> {
     let vertices_of = |face: u32| mesh.faces[face as usize].vertices;
     let way_B = [&place.point_B, &hip_B];
     let leaving = &Left { mesh, on: place.on };
+    let sheet = |face| leaves_sheet(mesh, place.at(), &(hip_B - place.point_B), face);
     let hit = match place.on {
-        On::Face(_) => mesh.first_hit_in_flight(way_B, leaving, |face| face == side.face),
+        On::Face(_) => mesh.first_hit_in_flight(way_B, leaving, |face| face == side.face || sheet(face)),
         On::Edge(_, edge) => {
             let ends = [edge, next(edge)].map(|corner| facet.face.vertices[corner]);
             let has_both = |face| ends.iter().all(|end| vertices_of(face).contains(end));
-            mesh.first_hit_in_flight(way_B, leaving, has_both)
+            mesh.first_hit_in_flight(way_B, leaving, |face| has_both(face) || sheet(face))
         }
         On::Vertex(_, corner) => {
             let tip = facet.face.vertices[corner];
-            mesh.first_hit_in_flight(way_B, leaving, |face| vertices_of(face).contains(&tip))
+            let has_tip = |face| vertices_of(face).contains(&tip);
+            mesh.first_hit_in_flight(way_B, leaving, |face| has_tip(face) || sheet(face))
         }
         On::Crossing(_, other) => {
-            mesh.first_hit_in_flight(way_B, leaving, |face| face == side.face || face == other.face)
+            let is_crossed = |face| face == side.face || face == other.face;
+            mesh.first_hit_in_flight(way_B, leaving, |face| is_crossed(face) || sheet(face))
         }
     };
     hit.map(|hit| Place::hit(&hit))

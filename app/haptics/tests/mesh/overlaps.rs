@@ -215,6 +215,46 @@ fn along_a_floor_a_finger_comes_to_the_open_wall_that_stands_in_it() {
     }
 }
 
+/// To where a wall stands in a floor, and from there back, along it, up it and away.
+#[test]
+fn a_finger_leaves_the_foot_of_an_open_wall_on_the_side_that_it_came_to() {
+    let floor = [[-0.06, 0.0, -0.06], [-0.06, 0.0, 0.06], [0.06, 0.0, 0.06], [0.06, 0.0, -0.06]];
+    let mut noise = Noise(5);
+    for case in 0..60 {
+        let (lean, turn) = (noise.between(-0.4, 0.4), noise.between(-0.5, 0.5));
+        let wall = |y: f64, z: f64| [lean * y + turn * z, y, z];
+        let corners = [wall(-0.03, -0.05), wall(-0.03, 0.05), wall(0.05, 0.05), wall(0.05, -0.05)];
+        let block = |up: f64| {
+            let mut block = make::cuboid([0.12, 0.04, 0.12]);
+            block.vertices.iter_mut().for_each(|at| at.y += up);
+            block
+        };
+        let ground = if case % 2 == 0 { block(-0.02) } else { with_sheet(TriangleSoup::default(), floor) };
+        let mesh = built(with_sheet(ground, corners));
+        let friction = if case % 3 == 0 { Friction::coulomb(0.2).unwrap() } else { Friction::None };
+        let entity = touchable(&mesh, friction);
+        let sign = if case % 4 < 2 { 1.0 } else { -1.0 };
+        // Through the wall's foot by 3 mm, 1 mm deep in the floor.
+        let to_foot = [Vector3::new(-0.02 * sign, 1e-3, 0.0), Vector3::new(3e-3 * sign, -1e-3, 1e-3)];
+        for end in [
+            Vector3::new(-0.02 * sign, -1e-3, 2e-3),
+            Vector3::new(-0.02 * sign, 0.02, -3e-3),
+            Vector3::new(-0.03 * sign, 1e-3, 0.0),
+        ] {
+            let mut finger = point_finger();
+            let mut way = |from: Vector3<f64>, to: Vector3<f64>| {
+                let hips = (0..=200).map(|tick| from + (to - from) * (f64::from(tick) / 200.0));
+                hips.map(|hip| step(&mut finger, &entity, &hip)).last().unwrap()
+            };
+            let held = way(to_foot[0], to_foot[1]);
+            assert!(held.force_on_user_W.x * sign < -1.0, "{case}: {held:?}");
+            let out = way(to_foot[1], end);
+            let depth_m = (-end.y).max(0.0);
+            assert!((out.force_on_user_W.norm() - depth_m * K).abs() < 0.3, "{case}: {end:?}, {out:?}");
+        }
+    }
+}
+
 #[test]
 fn among_boxes_that_sheets_go_through_no_finger_gets_into_one() {
     let mut touched = 0;
