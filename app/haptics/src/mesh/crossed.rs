@@ -13,8 +13,8 @@
 
 use nalgebra::Vector3;
 
-use super::Mesh;
 use super::winding::Parts;
+use super::{Mesh, Sides};
 
 /// Boxes of more pairs overlap only where faces lie in heaps upon one another.
 pub(super) const MOST_PAIRS: usize = 1000;
@@ -26,7 +26,8 @@ impl Mesh {
         let is_done =
             self.for_each_crossed_pair(parts, |pair| pair.iter().for_each(|&face| is_crossed[face] = true));
         for (face, is_crossed) in self.faces.iter_mut().zip(is_crossed) {
-            face.is_crossed = is_crossed || !is_done;
+            // Of sheets in heaps none is: a walk among them would end nowhere.
+            face.is_crossed = if is_done { is_crossed } else { face.sides == Sides::Solid };
         }
         self.faces.iter().filter(|face| face.is_crossed).count()
     }

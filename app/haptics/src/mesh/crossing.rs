@@ -59,7 +59,7 @@ pub(super) fn meet_others(mesh: &Mesh, place: Place, reached: Reached, hip_B: &V
                 || passed.contains(&number)
                 || face.vertices.iter().any(is_neighbour)
                 || is_parallel()
-                || leaves_sheet(mesh, place.at(), &way_B, number)
+                || leaves_sheet(mesh, &place, &way_B, number)
         };
         let Some(hit) = mesh.first_hit_of_others(&place.point_B, &reached.place().point_B, is_skipped) else {
             break;
@@ -78,7 +78,10 @@ pub(super) fn meet_others(mesh: &Mesh, place: Place, reached: Reached, hip_B: &V
             let here = on_rim(Place::new(hit.point_B, On::Face(side)));
             let side = face_of_line(mesh, here, met.side(), &to_hip_B);
             let other = face_of_line(mesh, met, side, &to_hip_B);
-            return Reached::Rim(Place::new(hit.point_B, On::Crossing(side, other)));
+            let sides = if matches!(place.on, On::Crossing(..)) { place.crossing() } else { [None; 3] };
+            let is_third = |third: &Side| third.face != side.face && third.face != other.face;
+            let third = sides.into_iter().flatten().find(is_third);
+            return Reached::Rim(Place::new(hit.point_B, On::Crossing(side, other)).with_third(third));
         }
         passed[passing] = hit.face;
     }
@@ -87,15 +90,14 @@ pub(super) fn meet_others(mesh: &Mesh, place: Place, reached: Reached, hip_B: &V
 
 /// Whether a way that begins where two faces cross leads away from this one, on its side, as a sheet or a neighbour of it: whoever
 /// goes that way has come from there, and its other side is not met.
-pub(super) fn leaves_sheet(mesh: &Mesh, at: On, way_B: &Vector3<f64>, number: u32) -> bool {
-    let On::Crossing(one, other) = at else { return false };
+pub(super) fn leaves_sheet(mesh: &Mesh, from: &Place, way_B: &Vector3<f64>, number: u32) -> bool {
     let face = &mesh.faces[number as usize];
     let is_left = |side: Side| {
         let vertices = &mesh.faces[side.face as usize].vertices;
         let is_there = side.face == number || face.vertices.iter().any(|vertex| vertices.contains(vertex));
         is_there && Facet::of(mesh, Side { face: number, ..side }).normal_B.dot(way_B) >= 0.0
     };
-    face.sides == Sides::Sheet && (is_left(one) || is_left(other))
+    face.sides == Sides::Sheet && from.crossing().into_iter().flatten().any(is_left)
 }
 
 /// Of the faces that meet at an edge or a vertex, the one into which the line leads, towards the HIP, in which `other` crosses

@@ -14,6 +14,8 @@ pub(crate) struct Place {
     pub(crate) on: On,
     /// Feature that it lies on: of a corner or an edge, a face that meets there may hold the HIP back.
     at: On,
+    /// Where three faces cross, the one of which `at` says nothing.
+    third: Option<Side>,
 }
 
 /// A feature of a mesh, told by one of its faces.
@@ -48,7 +50,7 @@ pub(crate) struct Facet<'m> {
 impl Place {
     #[inline(always)]
     pub(crate) fn new(point_B: Vector3<f64>, on: On) -> Self {
-        Self { point_B, on, at: on }
+        Self { point_B, on, at: on, third: None }
     }
 
     #[inline]
@@ -72,9 +74,17 @@ impl Place {
         Self::new(nearest.point_B, on)
     }
 
-    /// The feature that it lies on.
-    pub(super) fn at(&self) -> On {
-        self.at
+    /// The same, where a third face crosses the two.
+    pub(super) fn with_third(self, third: Option<Side>) -> Self {
+        Self { third, ..self }
+    }
+
+    /// The sides of faces that are known to cross there.
+    pub(super) fn crossing(&self) -> [Option<Side>; 3] {
+        match self.at {
+            On::Crossing(one, other) => [Some(one), Some(other), self.third],
+            _ => [None; 3],
+        }
     }
 
     /// A face that it lies on.

@@ -283,7 +283,7 @@ fn fly(mesh: &Mesh, place: Place, hip_B: Vector3<f64>) -> Option<Place> {
     let vertices_of = |face: u32| mesh.faces[face as usize].vertices;
     let way_B = [&place.point_B, &hip_B];
     let leaving = &Left { mesh, on: place.on };
-    let sheet = |face| leaves_sheet(mesh, place.at(), &(hip_B - place.point_B), face);
+    let sheet = |face| leaves_sheet(mesh, &place, &(hip_B - place.point_B), face);
     let hit = match place.on {
         On::Face(_) => mesh.first_hit_in_flight(way_B, leaving, |face| face == side.face || sheet(face)),
         On::Edge(_, edge) => {
