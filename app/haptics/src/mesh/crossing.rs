@@ -32,7 +32,7 @@ pub(super) fn follow_crossing(
     };
     match if way_m(&second) < way_m(&first) { second } else { first } {
         Reached::Target(_) => Reached::Target(Place::new(target_B, On::Crossing(sides[0], sides[1]))),
-        rim => rim,
+        Reached::Rim(place) => Reached::Rim(place.with_crossing([Some(sides[0]), Some(sides[1]), None])),
     }
 }
 
@@ -78,10 +78,8 @@ pub(super) fn meet_others(mesh: &Mesh, place: Place, reached: Reached, hip_B: &V
             let here = on_rim(Place::new(hit.point_B, On::Face(side)));
             let side = face_of_line(mesh, here, met.side(), &to_hip_B);
             let other = face_of_line(mesh, met, side, &to_hip_B);
-            let sides = if matches!(place.on, On::Crossing(..)) { place.crossing() } else { [None; 3] };
-            let is_third = |third: &Side| third.face != side.face && third.face != other.face;
-            let third = sides.into_iter().flatten().find(is_third);
-            return Reached::Rim(Place::new(hit.point_B, On::Crossing(side, other)).with_third(third));
+            let met = Place::new(hit.point_B, On::Crossing(side, other));
+            return Reached::Rim(met.with_crossing(place.crossing()));
         }
         passed[passing] = hit.face;
     }

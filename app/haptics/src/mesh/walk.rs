@@ -97,7 +97,7 @@ pub(crate) fn stand(mesh: &Mesh, mut place: Place, input: &ConeInput) -> Option<
             return Some((place, TangentView::new(&place.point_B, normal_B, offset_m, input)));
         }
         if let Some(rim) = rim(mesh, place) {
-            place = rim;
+            place = rim.with_crossing(place.crossing());
             continue;
         }
         match leave(mesh, place, hip_B)? {

@@ -255,6 +255,46 @@ fn a_finger_leaves_the_foot_of_an_open_wall_on_the_side_that_it_came_to() {
     }
 }
 
+/// A post of six sides, closed or open, in a block or an open floor: to it from all around, up along it, and away.
+#[test]
+fn a_finger_leaves_a_post_of_many_sides_that_stands_in_an_open_floor() {
+    for (case, is_closed) in (0..48).zip([true, false].into_iter().cycle()) {
+        let mut noise = Noise(case);
+        let (turn, middle) = (noise.between(0.0, 1.0), noise.between(-0.004, 0.004));
+        let corner = |at: u32, y: f64| {
+            let angle = turn + f64::from(at) * std::f64::consts::TAU / 6.0;
+            Vector3::new(0.01 * angle.cos(), y, 0.01 * angle.sin())
+        };
+        let mut all = TriangleSoup::default();
+        all.vertices.extend((0..12).map(|at| corner(at % 6, if at < 6 { -0.01 } else { 0.03 })));
+        for (at, next) in (0..6).map(|at| (at, (at + 1) % 6)) {
+            all.faces.extend([[at, at + 6, next + 6], [at, next + 6, next]]);
+        }
+        if is_closed {
+            (1..5).for_each(|at| all.faces.extend([[0, at, at + 1], [6, at + 7, at + 6]]));
+        }
+        let floor = [[-0.06, 0.0, -0.06], [-0.06, 0.0, 0.06], [0.06, 0.0, 0.06], [0.06, 0.0, -0.06]];
+        let entity = touchable(&built(with_sheet(all, floor)), Friction::None);
+        let mut finger = point_finger();
+        let hips = [
+            Vector3::new(-0.02, 1e-3, middle),
+            Vector3::new(-0.02, -1e-3, middle),
+            Vector3::new(-0.004, -1e-3, middle),
+            Vector3::new(-0.004, 0.02, middle),
+            Vector3::new(-0.02, 0.02, middle),
+            Vector3::new(-0.02, 1e-3, middle),
+        ];
+        let mut last = None;
+        for (from, to) in hips.iter().zip(&hips[1..]) {
+            let way = (0..=200).map(|tick| from + (to - from) * (f64::from(tick) / 200.0));
+            last = way.map(|hip| step(&mut finger, &entity, &hip)).last();
+            let held_m = last.as_ref().unwrap().force_on_user_W.norm() / K;
+            assert!(held_m < 8e-3, "{case}: {to:?}, {last:?}");
+        }
+        assert!(last.unwrap().entity.is_none(), "{case}: {last:?}");
+    }
+}
+
 #[test]
 fn among_boxes_that_sheets_go_through_no_finger_gets_into_one() {
     let mut touched = 0;
