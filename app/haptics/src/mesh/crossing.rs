@@ -32,7 +32,7 @@ pub(super) fn follow_crossing(
     };
     match if way_m(&second) < way_m(&first) { second } else { first } {
         Reached::Target(_) => Reached::Target(Place::new(target_B, On::Crossing(sides[0], sides[1]))),
-        Reached::Rim(place) => Reached::Rim(place.with_crossing([Some(sides[0]), Some(sides[1]), None])),
+        rim => rim,
     }
 }
 
@@ -78,12 +78,17 @@ pub(super) fn meet_others(mesh: &Mesh, place: Place, reached: Reached, hip_B: &V
             let here = on_rim(Place::new(hit.point_B, On::Face(side)));
             let side = face_of_line(mesh, here, met.side(), &to_hip_B);
             let other = face_of_line(mesh, met, side, &to_hip_B);
-            let met = Place::new(hit.point_B, On::Crossing(side, other));
-            return Reached::Rim(met.with_crossing(place.crossing()));
+            return Reached::Rim(Place::new(hit.point_B, On::Crossing(side, other)));
         }
         passed[passing] = hit.face;
     }
     reached
+}
+
+/// Sides of faces that crossed where a way began, and that it has not left.
+pub(super) fn still_crossing(mesh: &Mesh, from: &Place, point_B: &Vector3<f64>) -> [Option<Side>; 3] {
+    let is_on = |side: &Side| Facet::of(mesh, *side).depth_m(point_B).abs() <= ON_FACE * mesh.extent_m;
+    from.crossing().map(|side| side.filter(is_on))
 }
 
 /// Whether a way that begins where two faces cross leads away from this one, on its side, as a sheet or a neighbour of it: whoever
@@ -154,5 +159,7 @@ pub(super) fn plane_at_crossing(
 
 /// Faces past whose rims one way may lead.
 const MAX_PASSED: usize = 4;
+/// In extents: a point that is nearer to a face lies on it.
+const ON_FACE: f64 = 4e-13;
 /// Sine of the angle below which faces that cross are as one.
 const PARALLEL_FACES: f64 = 1e-6;

@@ -32,7 +32,7 @@ use nalgebra::Vector3;
 use super::Mesh;
 use super::bvh::Leaving;
 use super::crack::{self, Beyond};
-use super::crossing::{follow_crossing, leaves_sheet, meet_others, plane_at_crossing};
+use super::crossing::{follow_crossing, leaves_sheet, meet_others, plane_at_crossing, still_crossing};
 use super::draw::{Draw, Drawn};
 use super::facing::facing;
 use super::ledge::off_ledge;
@@ -159,9 +159,12 @@ pub(crate) fn walk(
                 return Some(rest(place, &(start_B - place.point_B), changes, draw, input));
             }
         }
+        let still = still_crossing(mesh, &place, &reached.place().point_B);
         match reached {
-            Reached::Target(place) => return Some(Walked { place, view, tangential_B, changes }),
-            Reached::Rim(place_there) => (place, view) = stand(mesh, place_there, input)?,
+            Reached::Target(there) => {
+                return Some(Walked { place: there.with_crossing(still), view, tangential_B, changes });
+            }
+            Reached::Rim(there) => (place, view) = stand(mesh, there.with_crossing(still), input)?,
         }
     }
 }

@@ -215,10 +215,22 @@ fn along_a_floor_a_finger_comes_to_the_open_wall_that_stands_in_it() {
     }
 }
 
+/// An open floor of so many cells each way.
+fn open_floor(cells: u32) -> TriangleSoup {
+    let mut all = TriangleSoup::default();
+    let at = |place: u32| 0.12 * (f64::from(place) / f64::from(cells) - 0.5);
+    let places = (0..=cells).flat_map(|i| (0..=cells).map(move |j| (i, j)));
+    all.vertices.extend(places.map(|(i, j)| Vector3::new(at(i), 0.0, at(j))));
+    for (i, j) in (0..cells).flat_map(|i| (0..cells).map(move |j| (i, j))) {
+        let [a, b] = [i * (cells + 1) + j, (i + 1) * (cells + 1) + j];
+        all.faces.extend([[a, a + 1, b + 1], [a, b + 1, b]]);
+    }
+    all
+}
+
 /// To where a wall stands in a floor, and from there back, along it, up it and away.
 #[test]
 fn a_finger_leaves_the_foot_of_an_open_wall_on_the_side_that_it_came_to() {
-    let floor = [[-0.06, 0.0, -0.06], [-0.06, 0.0, 0.06], [0.06, 0.0, 0.06], [0.06, 0.0, -0.06]];
     let mut noise = Noise(5);
     for case in 0..60 {
         let (lean, turn) = (noise.between(-0.4, 0.4), noise.between(-0.5, 0.5));
@@ -229,7 +241,7 @@ fn a_finger_leaves_the_foot_of_an_open_wall_on_the_side_that_it_came_to() {
             block.vertices.iter_mut().for_each(|at| at.y += up);
             block
         };
-        let ground = if case % 2 == 0 { block(-0.02) } else { with_sheet(TriangleSoup::default(), floor) };
+        let ground = if case % 2 == 0 { block(-0.02) } else { open_floor(1 + case / 8) };
         let mesh = built(with_sheet(ground, corners));
         let friction = if case % 3 == 0 { Friction::coulomb(0.2).unwrap() } else { Friction::None };
         let entity = touchable(&mesh, friction);
@@ -240,6 +252,7 @@ fn a_finger_leaves_the_foot_of_an_open_wall_on_the_side_that_it_came_to() {
             Vector3::new(-0.02 * sign, -1e-3, 2e-3),
             Vector3::new(-0.02 * sign, 0.02, -3e-3),
             Vector3::new(-0.03 * sign, 1e-3, 0.0),
+            Vector3::new(3e-3 * sign, 0.06, 1e-3),
         ] {
             let mut finger = point_finger();
             let mut way = |from: Vector3<f64>, to: Vector3<f64>| {
@@ -273,8 +286,10 @@ fn a_finger_leaves_a_post_of_many_sides_that_stands_in_an_open_floor() {
         if is_closed {
             (1..5).for_each(|at| all.faces.extend([[0, at, at + 1], [6, at + 7, at + 6]]));
         }
-        let floor = [[-0.06, 0.0, -0.06], [-0.06, 0.0, 0.06], [0.06, 0.0, 0.06], [0.06, 0.0, -0.06]];
-        let entity = touchable(&built(with_sheet(all, floor)), Friction::None);
+        let (floor, first) = (open_floor(1 + case as u32 / 8), all.vertices.len() as u32);
+        all.vertices.extend(floor.vertices);
+        all.faces.extend(floor.faces.iter().map(|face| face.map(|corner| corner + first)));
+        let entity = touchable(&built(all), Friction::None);
         let mut finger = point_finger();
         let hips = [
             Vector3::new(-0.02, 1e-3, middle),
