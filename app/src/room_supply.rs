@@ -10,7 +10,7 @@ use rtrb::{Consumer, Producer, RingBuffer};
 use std::thread::JoinHandle;
 use std::time::Duration;
 
-/// Where room comes from.
+/// Source of room.
 #[derive(Default)]
 pub enum RoomSupply {
     /// It is made at once.

@@ -58,7 +58,7 @@ pub struct Manipulation {
     entities: Vec<usize>,
     /// Contact points, and all that has a place for each of them.
     room: Box<RowRoom>,
-    /// What becomes [`Self::room`] in the next tick, and what was that.
+    /// Those that become [`Self::room`] in the next tick, and those that were.
     next_room: Option<Box<RowRoom>>,
     used_room: Option<Box<RowRoom>>,
     motions: Vec<Motion>,

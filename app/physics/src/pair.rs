@@ -273,7 +273,7 @@ impl Pair {
         self.is_new = true;
     }
 
-    /// Whether it had rows in the last tick.
+    /// True if it had rows in the last tick.
     pub(crate) fn touches(&self) -> bool {
         self.rows > 0
     }
@@ -316,7 +316,7 @@ impl Pair {
         }
     }
 
-    /// What its impulses put in, by the velocities that they left (J), negative: what they took; and a body of it that moves.
+    /// Work of its impulses, by the velocities that they left (J), negative: taken from the bodies; and a body of it that moves.
     pub(crate) fn impulses_j(&self, end: &End<'_>) -> Option<(usize, f64)> {
         // Without rows its places are of another tick.
         if self.rows == 0 || self.surfacing.response.restitution().is_none() {

@@ -29,11 +29,11 @@ pub(crate) struct Pairs {
     asleep: Vec<Key>,
     /// Room for those that begin in a tick.
     fresh: Vec<Key>,
-    /// How many were left out for want of room, in a tick in which they were missing.
+    /// Number that was left out for want of room, in ticks in which they were missing.
     pub(crate) left_out: u64,
-    /// How many more will be, if there is no room before the next one.
+    /// Number that will be, if there is no room before the next one.
     pub(crate) missing: u64,
-    /// Whether any were since there was more room.
+    /// True if any were since there was more room.
     lacks_some: bool,
     /// There are no more of them in the world.
     most: usize,
@@ -107,12 +107,12 @@ impl Pairs {
         }
     }
 
-    /// How many have room.
+    /// Number that has room.
     pub(crate) fn room(&self) -> usize {
         self.pool.len()
     }
 
-    /// How many should have room, if that is more than have: twice as many as are used.
+    /// Number that should have room, if that is more than has: twice as many as are used.
     pub(crate) fn wanted(&self) -> Option<usize> {
         let room = self.pool.len();
         let used = room - self.unused.len() + (self.missing as usize).min(room);

@@ -148,7 +148,7 @@ pub enum ModelError {
     /// There is nothing to touch in it.
     #[error("found no triangle in it{}; allowed: at least one", only_points(*.points))]
     NoTriangle {
-        /// What there is instead.
+        /// Points that there are instead.
         points: usize,
     },
 }

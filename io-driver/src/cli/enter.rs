@@ -5,10 +5,10 @@ use rustix::event::{PollFd, PollFlags, Timespec, poll};
 use std::io::{self, ErrorKind};
 use std::os::fd::AsFd;
 
-/// How long it takes until a signal that another thread received is seen.
+/// Time until a signal that another thread received is seen.
 const LOOK: Timespec = Timespec { tv_sec: 0, tv_nsec: 50_000_000 };
 
-/// What ended the wait.
+/// End of the wait.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Entered {
     /// A line, of which nothing is told.
@@ -22,7 +22,7 @@ pub(super) enum Entered {
 /// Waits for the end of a line of the standard input; what follows stays there.
 ///
 /// # Errors
-/// What the system says of the standard input.
+/// Errors of the standard input.
 pub(super) fn wait_for_enter(signals: &StopSignals) -> io::Result<Entered> {
     let input = io::stdin();
     loop {

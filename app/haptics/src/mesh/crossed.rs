@@ -6,7 +6,8 @@
 //! Model: two triangles have no common point if along the normal of one of them, or along a direction across an edge of
 //! each, they are apart (separating axes). What share a vertex are neighbours, and are left out.
 //!
-//! A part that cannot be oriented is no obstacle to itself: a Klein bottle passes through itself, and whoever walks over it goes on.
+//! A part that cannot be oriented is no obstacle to itself: a Klein bottle passes through itself, and whoever walks over it
+//! goes on.
 //!
 //! In doubt a face is taken for crossed: that costs a walk time, and nothing else.
 //! Cost: about linear; at most [`MOST_PAIRS`] for each face, beyond which all are taken for crossed.

@@ -91,8 +91,8 @@ pub(super) fn still_crossing(mesh: &Mesh, from: &Place, point_B: &Vector3<f64>) 
     from.crossing().map(|side| side.filter(is_on))
 }
 
-/// Whether a way that begins where two faces cross leads away from this one, on its side, as a sheet or a neighbour of it: whoever
-/// goes that way has come from there, and its other side is not met.
+/// True if a way that begins where two faces cross leads away from this one, on its side, as a sheet or a neighbour of it:
+/// whoever goes that way has come from there, and its other side is not met.
 pub(super) fn leaves_sheet(mesh: &Mesh, from: &Place, way_B: &Vector3<f64>, number: u32) -> bool {
     let face = &mesh.faces[number as usize];
     let is_left = |side: Side| {

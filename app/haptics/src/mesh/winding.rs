@@ -35,7 +35,7 @@ impl Parts {
         self.all[part].first
     }
 
-    /// Whether a part has two sides, perhaps both outside.
+    /// True of a part with two sides, perhaps both outside.
     pub(super) fn is_orientable(&self, part: usize) -> bool {
         self.all[part].is_orientable
     }

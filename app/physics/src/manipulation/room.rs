@@ -24,7 +24,7 @@ pub struct Wanted {
     rows: Option<RowCounts>,
 }
 
-/// How many rows there may be in a tick, and of what.
+/// Numbers of rows that there may be in a tick.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct RowCounts {
     pub(super) of_pairs: usize,
@@ -47,7 +47,7 @@ struct PairRoom {
     departure: Vec<Key>,
 }
 
-/// What has a place for each contact point of a tick.
+/// Lists with a place for each contact point of a tick.
 #[derive(Debug)]
 pub(super) struct RowRoom {
     pub(super) counts: RowCounts,

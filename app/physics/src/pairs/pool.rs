@@ -33,7 +33,7 @@ impl Pool {
         pool
     }
 
-    /// How many pairs have room.
+    /// Number of pairs that have room.
     pub(super) fn len(&self) -> usize {
         self.chunks.len() * CHUNK
     }

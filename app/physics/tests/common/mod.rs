@@ -17,7 +17,7 @@ pub struct World {
     /// What the fingers do besides touching; their HIPs are set by `step`.
     pub ticks: Vec<FingerTick>,
     pub made: Made,
-    /// Whether there is more room for contacts when it is needed.
+    /// True: there is more room for contacts when it is needed.
     pub makes_room: bool,
 }
 
