@@ -119,7 +119,7 @@ fn a_film_has_a_picture_for_each_of_its_moments() {
 fn a_film_ends_links_in_its_directory_and_tells_what_an_earlier_one_left_there() {
     let place = place();
     std::fs::create_dir(place.path("film")).expect("a directory");
-    let frame = |number: u32| place.path(&format!("film/frame-{number:06}.png"));
+    let frame = |number: u32| place.path(format!("film/frame-{number:06}.png"));
     for (number, name) in [(0, "mine"), (1, "yours"), (3, "old"), (7, "older")] {
         std::fs::write(place.path(name), name).expect("a file");
         match number {

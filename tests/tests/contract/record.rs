@@ -267,7 +267,7 @@ fn a_recording_without_one_of_its_chunks_is_not_whole() {
     ran(&place, &["run", "scene.toml", "--clock", "virtual", "--seconds", "3", "--record", "r.mcap"]);
     let whole = bytes(&place, "r.mcap");
     for which in [3, 5] {
-        place.write("less.mcap", &without_chunk(&whole, which));
+        place.write("less.mcap", without_chunk(&whole, which));
         let said = place.run(["export", "less.mcap", "--csv", "left.csv"]);
         assert!(said.err.contains("its end tells of 3000 rows, of which"), "{}", said.err);
         let said = place.run(["replay", "less.mcap", "--expect-same"]);
