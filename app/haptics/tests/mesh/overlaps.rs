@@ -268,6 +268,37 @@ fn a_finger_leaves_the_foot_of_an_open_wall_on_the_side_that_it_came_to() {
     }
 }
 
+/// In some ticks on the way up its god-object moves by less than rounding: it is at the foot all the same.
+#[test]
+fn a_finger_that_goes_slowly_up_an_open_wall_leaves_its_foot() {
+    let mut floor = open_floor(5);
+    floor.vertices.iter_mut().for_each(|at| *at *= 2.0 / 3.0);
+    let wall = |y: f64, z: f64| [0.1 * y, y, z];
+    let mesh = built(with_sheet(
+        floor,
+        [wall(-0.01, -0.03), wall(-0.01, 0.03), wall(0.03, 0.03), wall(0.03, -0.03)],
+    ));
+    let entity = touchable(&mesh, Friction::None);
+    let mut finger = point_finger();
+    let hips = [
+        [-0.02, 1e-3, 1e-3],
+        [-0.02, -1e-3, 1e-3],
+        [3e-3, -1e-3, 1.5e-3],
+        [3e-3, 0.04, 1.7e-3],
+        [-0.02, 0.04, 2e-3],
+    ];
+    let hips = hips.map(Vector3::from);
+    for (from, to) in hips.iter().zip(&hips[1..]) {
+        let ticks = ((to - from).norm() / 1e-4) as u32;
+        for tick in 0..ticks {
+            let hip = from + (to - from) * (f64::from(tick) / f64::from(ticks));
+            let out = step(&mut finger, &entity, &hip);
+            assert!(out.force_on_user_W.norm() < 4.0, "{hip:?}: {out:?}");
+        }
+    }
+    assert!(step(&mut finger, &entity, &hips[4]).entity.is_none());
+}
+
 /// A post of six sides, closed or open, in a block or an open floor: to it from all around, up along it, and away.
 #[test]
 fn a_finger_leaves_a_post_of_many_sides_that_stands_in_an_open_floor() {
