@@ -101,11 +101,11 @@ const MAX_TOUCHES: usize = 64;
 /// Contact points between entities that have room at first, or so many of each body if that is more; until there is
 /// [more](room) others are left out, and counted. A quarter is for those with what does not move: nothing falls through a floor
 /// for want of room.
-const ROWS: usize = 2048;
-const ROWS_OF_BODY: usize = 4;
+const ROWS: usize = 8192;
+const ROWS_OF_BODY: usize = 8;
 /// Pairs of entities near each other that have room at first, or so many of each body if that is more, likewise.
-const PAIRS: usize = 1024;
-const PAIRS_OF_BODY: usize = 2;
+const PAIRS: usize = 4096;
+const PAIRS_OF_BODY: usize = 3;
 
 impl Manipulation {
     /// The entities of these numbers are bodies; all others are fixed.

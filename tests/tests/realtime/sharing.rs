@@ -179,7 +179,8 @@ fn an_application_confined_to_a_spinning_drivers_cpu_is_warned_and_answered_for_
 /// the next one, the driver would burn two thirds of its CPU, and of a faster one all.
 #[test]
 fn a_driver_whose_commander_stalls_stops_spinning_for_it() {
-    const TICKS: u64 = 2000;
+    const TICKS: u64 = 1000;
+    const WINDOWS: usize = 6;
     let _turn = in_turn();
     let config = "[real_time]\npriority = 0\nlock_memory = false\nwait = \"spin\"\n";
     let driver = Driver::start(&format!("{config}{TWO_DEVICES}"));
@@ -195,17 +196,21 @@ fn a_driver_whose_commander_stalls_stops_spinning_for_it() {
     });
     let begun = ticks();
     wait_until(|| ticks() > begun + 100);
-    let (before, Some(cpu_ns)) = (ticks(), thread.cpu_ns()) else {
-        println!("skipped: the kernel does not tell how long a thread has run");
-        return;
-    };
-    wait_until(|| ticks() > before + TICKS);
-    let cpu_ns = thread.cpu_ns().expect("as before") - cpu_ns;
-    let share = cpu_ns as f64 / ((ticks() - before) as f64 * 1e6);
-    println!("a stalled commander costs the driver {:.0} % of a CPU", 100.0 * share);
-    // At most 15 % are the margin before each tick, and 5 ms of spinning in each second come to it; where system calls are
-    // slow, as in a guest, 41 % were seen. The whole budget would be 50 %, and 65 with the margin.
-    assert!(share < 0.5, "{share}");
+    // What else the machine does only adds to it.
+    let mut least = f64::INFINITY;
+    for _ in 0..WINDOWS {
+        let (before, Some(cpu_ns)) = (ticks(), thread.cpu_ns()) else {
+            println!("skipped: the kernel does not tell how long a thread has run");
+            return;
+        };
+        wait_until(|| ticks() > before + TICKS);
+        let cpu_ns = thread.cpu_ns().expect("as before") - cpu_ns;
+        least = least.min(cpu_ns as f64 / ((ticks() - before) as f64 * 1e6));
+    }
+    println!("a stalled commander costs the driver {:.0} % of a CPU", 100.0 * least);
+    // At most 15 % are the margin before each tick, and 5 ms of spinning in each second come to it. The
+    // whole budget would be 50 %, and more with the margin.
+    assert!(least < 0.4, "{least}");
 }
 
 /// The first thing that anybody does, on the smallest machine.

@@ -57,9 +57,12 @@ proptest! {
             prop_assert!(contact.normal_force_n >= 0.0);
             let normal_force = out.force_on_user_W.dot(&contact.normal_W);
             let tangential = (out.force_on_user_W - contact.normal_W * normal_force).norm();
-            // Forces are rounded against their own size, rotated once, and along a scaled form's normal; what is cut off the damper
-            // as well.
-            let rounding = 3e-14 * out.force_on_user_W.norm() + 1e-15 * damping * moved.norm() / DT;
+            // Forces are rounded against their own size, rotated once; what is cut off the damper as well. What is along a way
+            // that is nearly along the normal has its direction from what is left of it.
+            let across = (moved - contact.normal_W * contact.normal_W.dot(&moved)).norm();
+            let rounding = 1e-14 * out.force_on_user_W.norm()
+                + 1e-15 * damping * moved.norm() / DT
+                + f64::EPSILON * tangential * moved.norm() / across;
             prop_assert!((normal_force - contact.normal_force_n).abs() <= rounding);
             prop_assert!(normal_force >= -rounding);
             if let Some(mu) = largest_ratio(&friction, contact.normal_force_n) {
