@@ -114,10 +114,12 @@ impl Manipulation {
             self.arrival.move_to(arrival);
             self.departure.move_to(departure);
             if self.pairs.take(pairs) {
+                // Only what a scene begins with was put there; what was left out since has come by itself, however deep it is.
+                let was_put = self.ticks == 0;
                 for at in 0..self.roster.awake().len() {
                     let body = self.roster.awake()[at];
                     let who = who(&self.roster, entities, self.contacts);
-                    self.pairs.meet(body, &who, &self.broad_phase, true);
+                    self.pairs.meet(body, &who, &self.broad_phase, was_put);
                 }
             }
         }

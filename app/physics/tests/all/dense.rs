@@ -5,7 +5,7 @@ use crate::common;
 
 use common::*;
 use haptics::{Cuboid, Entity, Sphere};
-use nalgebra::Isometry3;
+use nalgebra::{Isometry3, Vector3};
 use physics::{Body, ContactStiffness, Settings};
 
 /// Things of one size in rows, so far apart, on a floor; the lowest are the last.
@@ -88,4 +88,35 @@ fn a_heap_has_the_room_that_it_needs() {
     let nearest = pairs.map(|way_W| way_W.norm()).fold(f64::MAX, f64::min);
     // The weight of ten balls sinks in by 1e-4 of their radius on contacts by mass.
     assert!(nearest > 0.0198, "{nearest} m");
+}
+
+/// Things that met while there was no room for them are in each other when there is: nobody has put them there, and they gain
+/// nothing by it.
+#[test]
+fn nothing_is_gained_by_room_that_comes_late() {
+    let mut entities: Vec<Entity> = Vec::new();
+    for at in 0..1000 {
+        let [x, y, z] = [at % 10, at / 10 % 10, at / 100].map(|place| f64::from(place) * 0.035 - 0.1575);
+        entities.push(object(Sphere::new(0.01).unwrap(), Isometry3::translation(x, y, z), 1000.0, 0.0));
+    }
+    let moving = |at: usize| {
+        let still = body(&entities[at], 0.01);
+        still.moving(still.centre_W * -20.0, Vector3::zeros())
+    };
+    let bodies: Vec<(usize, Body)> = (0..entities.len()).map(|at| (at, moving(at))).collect();
+    let contact_stiffness = ContactStiffness::ByMass { damping_ratio: 1.0 };
+    let gravity_W = Vector3::zeros();
+    let mut world =
+        World::new(entities, &bodies, Settings { contact_stiffness, gravity_W, ..Settings::default() }, 0);
+    let energy_j =
+        |world: &World| world.manipulation.bodies().iter().map(Body::kinetic_energy_j).sum::<f64>();
+    let (begin_j, mut was_j) = (energy_j(&world), energy_j(&world));
+    for tick in 0..60 {
+        world.makes_room = tick >= 30;
+        world.step(&[]);
+        let now_j = energy_j(&world) + world.manipulation.elastic_energy_j();
+        assert!(now_j < was_j + 1e-9 * begin_j, "tick {tick}: {now_j} J after {was_j} J of {begin_j} J");
+        was_j = now_j;
+    }
+    assert!(world.manipulation.left_out() > 1000, "{}", world.manipulation.left_out());
 }
