@@ -148,18 +148,24 @@ fn forty_apps_killed_one_after_the_other_leave_no_value_wrong() {
     assert_eq!(account.checked, account.written, "{account:?}");
 }
 
-/// Forces of any size, in any direction, in any bits: what reaches the motors uses the limits, and keeps them.
+/// Forces of any size, in any direction, in any bits: what reaches the motors keeps the limits in every run, and
+/// uses them in one of at most eight. A machine that lets nobody run while they come shows the honest 1.2 N only.
 #[test]
 fn seconds_of_garbage_use_the_amplifiers_limits_and_keep_them() {
     for (peak_n, slew_n_per_s) in [(3.0, 400.0), (3.0, 4000.0), (8.5, 4000.0)] {
-        let strikes = vec![(0, Strike::Madman(1000), Then::Heal)];
-        let plan = Plan { seed: 3, peak_n, slew_n_per_s, strikes };
-        let account = campaign::run(&plan);
-        assert_eq!(account.checked, account.written, "{plan}: {account:?}");
-        // The honest force is 1.2 N. One that turns in every tick cannot grow beyond some steps, of 2 N or of
-        // 0.2 N; and a driver that is kept from running writes few values.
-        let longest_n = account.largest_force_un as f64 / 1e6;
-        let may_grow = slew_n_per_s > 1000.0 && account.written > 1000;
-        assert!(!may_grow || longest_n > 0.5 * peak_n, "{plan}: {longest_n} N");
+        let longest_n = |seed| {
+            let strikes = vec![(0, Strike::Madman(1000), Then::Heal)];
+            let plan = Plan { seed, peak_n, slew_n_per_s, strikes };
+            let account = campaign::run(&plan);
+            assert_eq!(account.checked, account.written, "{plan}: {account:?}");
+            account.largest_force_un as f64 / 1e6
+        };
+        // One that turns in every tick cannot grow beyond some steps, of 2 N or of 0.2 N.
+        if slew_n_per_s > 1000.0 {
+            let mut longest_n = (3..11).map(longest_n);
+            assert!(longest_n.any(|longest_n| longest_n > 0.5 * peak_n), "{peak_n} N, {slew_n_per_s} N/s");
+        } else {
+            longest_n(3);
+        }
     }
 }
