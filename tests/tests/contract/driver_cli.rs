@@ -2,7 +2,7 @@
 
 use patience::prelude::*;
 use rustix::process::{Pid, Signal, kill_process};
-use shm_abi::{FaultReason, stop_socket};
+use shm_abi::{DriverState, FaultReason, stop_socket};
 use std::ffi::OsStr;
 use std::path::Path;
 use std::process::{Command, Stdio};
@@ -56,6 +56,9 @@ fn a_configuration_from_standard_input_that_never_ends_is_refused() {
 fn watching_prints_a_line_a_second_until_the_driver_ends_and_says_how_it_ended() {
     for json in [false, true] {
         let mut driver = Driver::start(&resting("real", 2));
+        let observer = driver.observe();
+        let is_idle = |frame: shm_abi::Frame| frame.state == DriverState::Idle as u64;
+        patience::until("the first tick", || observer.driver.read_latest().is_some_and(is_idle));
         let mut watch = io_driver();
         watch.args(["status", "--watch", "--socket"]).arg(driver.socket());
         if json {
