@@ -237,7 +237,7 @@ impl Rig {
         let finger = Finger::new(spec.radius_m, capacity(entities, spec.radius_m))
             .map_err(|source| self.refused(None, format!("finger {}", spec.name), source))?;
         self.check_felt(entities, spec)?;
-        let finger = finger.within(self.space(spec.within.as_ref()));
+        let finger = finger.with_room_for(entities).within(self.space(spec.within.as_ref()));
         Ok(DeviceFinger { finger, device: spec.device, mount: self.mount(spec.device) })
     }
 

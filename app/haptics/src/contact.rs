@@ -92,7 +92,7 @@ pub(crate) struct Sweep<'h> {
 pub(crate) struct Slot {
     cone: Option<FrictionCone>,
     mesh: MeshCone,
-    /// Of a ball; large, and points have none.
+    /// Of a ball; large, and points have none but on what they [roll](crate::mesh::Mesh::point_radius_m) over.
     balls: Option<Box<Balls>>,
     csg: CsgCone,
     nurbs: NurbsCone,
@@ -207,6 +207,11 @@ impl Slot {
     pub(crate) fn new(finger_radius_m: f64) -> Self {
         let balls = (finger_radius_m > 0.0).then(Box::default);
         Self { balls, ..Self::default() }
+    }
+
+    /// Takes what a point rolls with, or gives it back.
+    pub(crate) fn balls_mut(&mut self) -> &mut Option<Box<Balls>> {
+        &mut self.balls
     }
 
     /// Forgets everything, if there is anything to forget.
@@ -352,11 +357,15 @@ impl Slot {
                 0.0
             }
         };
+        let rolls_m = match (&entity.algorithm, &entity.shape) {
+            (Algorithm::FrictionCone, Shape::Mesh(mesh)) if self.balls.is_some() => mesh.point_radius_m(),
+            _ => 0.0,
+        };
         let input = TouchInput {
             shape: entity.shape_for(sweep.finger_radius_m),
             // Above a dent nothing holds the god-object back.
             friction: if self.hovers { &Friction::None } else { material.friction },
-            finger_radius_m: sweep.finger_radius_m + lift_m,
+            finger_radius_m: (sweep.finger_radius_m + lift_m).max(rolls_m),
             previous_hip_B: previous_B,
             cone,
         };
@@ -499,6 +508,9 @@ impl Slot {
         let spring_n = input.cone.stiffness_n_per_m * input.way_m() + regained_n;
         let share =
             if entity.face_materials.is_some() { share * self.share_of_faces(&touch, input) } else { share };
+        let is_rolling_point =
+            sweep.finger_radius_m == 0.0 && input.finger_radius_m > 0.0 && entity.height_map.is_none();
+        let share = if is_rolling_point { share * let_down(&mut touch, input) } else { share };
         let is_plain = self.onset.came_on_n() == 0.0 && entity.is_plain(material);
         let mut explained_n =
             if is_plain { spring_n } else { self.explained_n(entity, material, &touch, input, spring_n) };
@@ -591,6 +603,15 @@ impl Slot {
         }
         Some((touch, raised_n))
     }
+}
+
+/// Brings a point that rolls as a ball down onto what it rolls on; says which share of the spring that leaves.
+#[cold]
+fn let_down(touch: &mut Touch, input: &TouchInput<'_>) -> f64 {
+    let god_object = &mut touch.god_object;
+    let spring_m = (god_object.point_B - input.cone.hip_B).norm();
+    god_object.point_B -= god_object.normal_B * input.finger_radius_m;
+    if spring_m > input.finger_radius_m { 1.0 - input.finger_radius_m / spring_m } else { 0.0 }
 }
 
 /// Seen from the entity, so that a finger riding along on a moving one is not damped.

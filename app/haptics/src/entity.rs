@@ -246,6 +246,11 @@ impl Entity {
         !is_lost && shape.is_felt_by(finger_radius_m)
     }
 
+    /// Whether points [roll](crate::mesh::Mesh::point_radius_m) over it.
+    pub(crate) fn rolls_points(&self) -> bool {
+        matches!(&self.shape, Shape::Mesh(mesh) if mesh.point_radius_m() > 0.0)
+    }
+
     /// One tick on: the current pose becomes the previous one.
     pub fn move_to(&mut self, X_WB: Isometry3<f64>) {
         self.previous_X_WB = self.X_WB;

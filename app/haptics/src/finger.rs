@@ -89,6 +89,16 @@ impl Finger {
         })
     }
 
+    /// A point that has room to [roll](crate::mesh::Mesh::point_radius_m) over all of these that ask for it; else over 16 at once.
+    #[must_use]
+    pub fn with_room_for(mut self, entities: &[Entity]) -> Self {
+        if self.radius_m == 0.0 {
+            let rolled = entities.iter().filter(|entity| entity.rolls_points()).count();
+            self.slots.make_room_to_roll(rolled);
+        }
+        self
+    }
+
     /// With another ramp for contacts that begin inside than [`RAMP_IN_S`]; 0 for none.
     ///
     /// Errors: a time not finite or negative.

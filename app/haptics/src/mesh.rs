@@ -101,6 +101,8 @@ pub struct Mesh {
     has_inside: bool,
     extent_m: f64,
     longest_edge_m: f64,
+    /// Where sheets cross anything.
+    point_radius_m: f64,
     /// Of a convex solid.
     convex_inner_m: Option<f64>,
     /// Of all meshes that this process has built, which. An address would be another mesh's as soon as this one is gone.
@@ -134,12 +136,21 @@ impl Mesh {
         &self.vertices
     }
 
+    /// Radius with which a point rolls over it as a ball \[m\]; 0: it [walks](walk). What passes through a sheet is on both sides of
+    /// it, and of a point on the line in which they cross nobody can tell the side; of a ball beside it everybody can.
+    pub fn point_radius_m(&self) -> f64 {
+        self.point_radius_m
+    }
+
     /// The same, felt from both sides though it may be closed: a room, felt by whoever is in it.
     #[must_use]
     pub fn into_sheet(mut self) -> Self {
+        if self.faces.iter().any(|face| face.is_crossed) {
+            self.point_radius_m = self.least_ball_m();
+        }
         for face in &mut self.faces {
             face.sides = Sides::Sheet;
-            (face.is_beside, face.is_at_ledge) = (false, false);
+            (face.is_crossed, face.is_beside, face.is_at_ledge) = (false, false, false);
         }
         Self { sides: Sides::Sheet, has_inside: false, convex_inner_m: None, ..self }
     }

@@ -3,6 +3,7 @@
 //! Invariants: a slot whose contact lives keeps its entity; entities are in ascending order, so that sums and what is
 //! recorded do not depend on the order in which they were met; no allocation after `new`.
 
+use crate::balls::Balls;
 use crate::contact::{Slot, Sweep};
 use crate::entity::Entity;
 use crate::hip::Hip;
@@ -15,7 +16,12 @@ pub(crate) struct Slots {
     used: Vec<Used>,
     /// Those that are not.
     unused: Vec<u32>,
+    /// Of a point: what it rolls with over [meshes](crate::mesh::Mesh::point_radius_m) that ask for it.
+    balls: Vec<Box<Balls>>,
 }
+
+/// So many of these meshes may be near a point at once, if nobody says more; over others it walks.
+const ROLLED: usize = 16;
 
 #[derive(Debug, Clone, Copy)]
 struct Used {
@@ -31,7 +37,19 @@ impl Slots {
             used: Vec::with_capacity(capacity),
             // The last one is taken first.
             unused: (0..capacity as u32).rev().collect(),
+            balls: if finger_radius_m > 0.0 {
+                Vec::new()
+            } else {
+                (0..capacity.min(ROLLED)).map(|_| Box::default()).collect()
+            },
         }
+    }
+
+    /// Makes room to roll over so many meshes at once, where that is less.
+    pub(crate) fn make_room_to_roll(&mut self, meshes: usize) {
+        let wanted = meshes.min(self.capacity());
+        let more = wanted.saturating_sub(self.balls.len());
+        self.balls.extend((0..more).map(|_| Box::default()));
     }
 
     pub(crate) fn capacity(&self) -> usize {
@@ -57,7 +75,7 @@ impl Slots {
     #[inline(never)]
     fn change(&mut self, near: impl Iterator<Item = u32> + Clone, entities: &[Entity], sweep: &Sweep<'_>) {
         let mut named = near.clone().peekable();
-        let (slots, unused) = (&mut self.slots, &mut self.unused);
+        let Self { slots, unused, balls, .. } = self;
         self.used.retain(|used| {
             while named.next_if(|near| *near < used.entity).is_some() {}
             let slot = &mut slots[used.slot as usize];
@@ -66,6 +84,9 @@ impl Slots {
             let stays = exists && (slot.has_met() || named.peek() == Some(&used.entity));
             if !stays {
                 slot.vacate();
+                if sweep.finger_radius_m == 0.0 {
+                    balls.extend(slot.balls_mut().take());
+                }
                 unused.push(used.slot);
             }
             stays
@@ -73,9 +94,13 @@ impl Slots {
         for entity in near {
             let Some(given) = entities.get(entity as usize) else { break };
             let Err(at) = self.used.binary_search_by_key(&entity, |used| used.entity) else { continue };
-            let Some(slot) = self.unused.pop() else { break };
-            self.used.insert(at, Used { entity, slot });
-            approach(&mut self.slots[slot as usize], entity, given, sweep);
+            let Some(number) = self.unused.pop() else { break };
+            self.used.insert(at, Used { entity, slot: number });
+            let slot = &mut self.slots[number as usize];
+            if given.rolls_points() && slot.balls_mut().is_none() {
+                *slot.balls_mut() = self.balls.pop();
+            }
+            approach(slot, entity, given, sweep);
         }
     }
 

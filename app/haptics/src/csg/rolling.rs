@@ -272,6 +272,11 @@ impl Ground for CsgGround<'_> {
         false
     }
 
+    /// Pieces are bent: nobody goes far on them.
+    fn crossed_at(&self, _way_B: [&Vector3<f64>; 2]) -> Option<f64> {
+        Some(0.0)
+    }
+
     fn room_m(&self, centre_B: &Vector3<f64>, radius_m: f64, ahead_m: f64) -> Option<f64> {
         let known_m = self.csg.signed_distance(centre_B) - radius_m;
         let ahead_m = ahead_m.min(LOOK_AHEAD * radius_m);

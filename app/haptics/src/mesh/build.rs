@@ -117,6 +117,7 @@ impl Mesh {
             has_inside,
             extent_m,
             longest_edge_m,
+            point_radius_m: 0.0,
             convex_inner_m: None,
             identity,
             uv: None,
@@ -131,6 +132,7 @@ impl Mesh {
         if report.narrow_gaps.moved > 0 {
             mesh.mark_crossed(&parts);
         }
+        report.point_radius_m = mesh.point_radius_m;
         mesh.mark_ledges();
         mesh.convex_inner_m = if parts.len() == 1 { mesh.find_convex_inner_m() } else { None };
         Ok((mesh, report))

@@ -7,7 +7,8 @@
 //! each, they are apart (separating axes). What share a vertex are neighbours, and are left out.
 //!
 //! A part that cannot be oriented is no obstacle to itself: a Klein bottle passes through itself, and whoever walks over it
-//! goes on.
+//! goes on. Where sheets cross anything, points roll over the whole mesh as balls that nobody tells from points: a ball beside a
+//! sheet knows on which side of it it is.
 //!
 //! In doubt a face is taken for crossed: that costs a walk time, and nothing else.
 //! Cost: about linear; at most [`MOST_PAIRS`] for each face, beyond which all are taken for crossed.
@@ -21,16 +22,31 @@ use super::{Mesh, Sides};
 pub(super) const MOST_PAIRS: usize = 1000;
 
 impl Mesh {
-    /// Marks the faces that others pass through, and says how many they are.
+    /// Finds the faces that others pass through, and says how many they are. Those of solids are marked, for walks; where a sheet
+    /// is among them fingers [roll](Self::point_radius_m).
     pub(super) fn mark_crossed(&mut self, parts: &Parts) -> usize {
         let mut is_crossed = vec![false; self.faces.len()];
-        let is_done =
-            self.for_each_crossed_pair(parts, |pair| pair.iter().for_each(|&face| is_crossed[face] = true));
+        let mut do_sheets_cross = false;
+        let is_done = self.for_each_crossed_pair(parts, |pair| {
+            let [one, other] = pair.map(|face| &self.faces[face]);
+            // Skins that lie on one another go nowhere.
+            do_sheets_cross |= [one.sides, other.sides].contains(&Sides::Sheet)
+                && one.normal_B.cross(&other.normal_B).norm() > PARALLEL;
+            pair.iter().for_each(|&face| is_crossed[face] = true);
+        });
+        let sheets = self.faces.iter().zip(&is_crossed).filter(|(face, _)| face.sides == Sides::Sheet);
+        let crossed_sheets = sheets.filter(|(_, is_crossed)| **is_crossed).count();
+        self.point_radius_m = if do_sheets_cross { self.least_ball_m() } else { 0.0 };
         for (face, is_crossed) in self.faces.iter_mut().zip(is_crossed) {
-            // Of sheets in heaps none is: a walk among them would end nowhere.
-            face.is_crossed = if is_done { is_crossed } else { face.sides == Sides::Solid };
+            face.is_crossed = face.sides == Sides::Solid && (is_crossed || !is_done);
         }
-        self.faces.iter().filter(|face| face.is_crossed).count()
+        crossed_sheets + self.faces.iter().filter(|face| face.is_crossed).count()
+    }
+
+    /// Radius of a ball that nobody tells from a point, and that has room beside what it has met.
+    pub(super) fn least_ball_m(&self) -> f64 {
+        let [low_B, high_B] = self.bounds_B();
+        (LEAST_BALL * (high_B - low_B).max()).min(LEAST_BALL_M)
     }
 
     /// Visits each pair of faces that pass through each other once; says whether these are all.
@@ -74,6 +90,11 @@ pub(super) fn do_cross(corners: &[[Vector3<f64>; 3]; 2], normals: &[Vector3<f64>
     !(normals.iter().copied().any(are_apart) || across(0).chain(across(1)).chain(of_both).any(are_apart))
 }
 
+/// Sine of the angle below which faces that cross are as one: in a decimetre they part by a tenth of a millimetre.
+const PARALLEL: f64 = 1e-3;
+/// As a share of the size of a mesh, and at most \[m\]: a third of a count of a device's encoders.
+const LEAST_BALL: f64 = 1e-4;
+const LEAST_BALL_M: f64 = 1e-5;
 /// As a share of the extent: nearer than this, a walk over one of two faces may be stopped by the other.
 const TOUCHING: f64 = 1e-12;
 

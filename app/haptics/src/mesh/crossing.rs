@@ -13,10 +13,10 @@
 
 use nalgebra::Vector3;
 
+use super::Mesh;
 use super::crack::over_ledge;
 use super::place::{Facet, On, Place, Side, previous};
 use super::walk::{Reached, cross_face, plane_through, rim};
-use super::{Mesh, Sides};
 
 /// Goes along the line in which two faces cross: to the target, or to the first of their edges on the way.
 pub(super) fn follow_crossing(
@@ -59,7 +59,6 @@ pub(super) fn meet_others(mesh: &Mesh, place: Place, reached: Reached, hip_B: &V
                 || passed.contains(&number)
                 || face.vertices.iter().any(is_neighbour)
                 || is_parallel()
-                || leaves_sheet(mesh, &place, &way_B, number)
         };
         let Some(hit) = mesh.first_hit_of_others(&place.point_B, &reached.place().point_B, is_skipped) else {
             break;
@@ -83,24 +82,6 @@ pub(super) fn meet_others(mesh: &Mesh, place: Place, reached: Reached, hip_B: &V
         passed[passing] = hit.face;
     }
     reached
-}
-
-/// Sides of faces that crossed where a way began, and that it has not left.
-pub(super) fn still_crossing(mesh: &Mesh, from: &Place, point_B: &Vector3<f64>) -> [Option<Side>; 3] {
-    let is_on = |side: &Side| Facet::of(mesh, *side).depth_m(point_B).abs() <= ON_FACE * mesh.extent_m;
-    from.crossing().map(|side| side.filter(is_on))
-}
-
-/// True if a way that begins where two faces cross leads away from this one, on its side, as a sheet or a neighbour of it:
-/// whoever goes that way has come from there, and its other side is not met.
-pub(super) fn leaves_sheet(mesh: &Mesh, from: &Place, way_B: &Vector3<f64>, number: u32) -> bool {
-    let face = &mesh.faces[number as usize];
-    let is_left = |side: Side| {
-        let vertices = &mesh.faces[side.face as usize].vertices;
-        let is_there = side.face == number || face.vertices.iter().any(|vertex| vertices.contains(vertex));
-        is_there && Facet::of(mesh, Side { face: number, ..side }).normal_B.dot(way_B) >= 0.0
-    };
-    face.sides == Sides::Sheet && from.crossing().into_iter().flatten().any(is_left)
 }
 
 /// Of the faces that meet at an edge or a vertex, the one into which the line leads, towards the HIP, in which `other` crosses
@@ -159,7 +140,5 @@ pub(super) fn plane_at_crossing(
 
 /// Faces past whose rims one way may lead.
 const MAX_PASSED: usize = 4;
-/// In extents: a point that is nearer to a face lies on it.
-const ON_FACE: f64 = 4e-13;
 /// Sine of the angle below which faces that cross are as one.
 const PARALLEL_FACES: f64 = 1e-6;

@@ -14,8 +14,6 @@ pub(crate) struct Place {
     pub(crate) on: On,
     /// Feature that it lies on: of a corner or an edge, a face that meets there may hold the HIP back.
     at: On,
-    /// Sides of faces that cross there, as far as is known.
-    crossing: [Option<Side>; 3],
 }
 
 /// A feature of a mesh, told by one of its faces.
@@ -50,11 +48,7 @@ pub(crate) struct Facet<'m> {
 impl Place {
     #[inline(always)]
     pub(crate) fn new(point_B: Vector3<f64>, on: On) -> Self {
-        let crossing = match on {
-            On::Crossing(one, other) => [Some(one), Some(other), None],
-            _ => [None; 3],
-        };
-        Self { point_B, on, at: on, crossing }
+        Self { point_B, on, at: on }
     }
 
     #[inline]
@@ -76,22 +70,6 @@ impl Place {
             _ => On::Face(side),
         };
         Self::new(nearest.point_B, on)
-    }
-
-    /// The same, where these cross as well, as far as there is room.
-    pub(super) fn with_crossing(mut self, sides: [Option<Side>; 3]) -> Self {
-        for side in sides.into_iter().flatten() {
-            let is_known = self.crossing.iter().flatten().any(|known| known.face == side.face);
-            if !is_known && let Some(free) = self.crossing.iter_mut().find(|known| known.is_none()) {
-                *free = Some(side);
-            }
-        }
-        self
-    }
-
-    /// The sides of faces that are known to cross there.
-    pub(super) fn crossing(&self) -> [Option<Side>; 3] {
-        self.crossing
     }
 
     /// A face that it lies on.

@@ -146,6 +146,8 @@ pub struct MeshReport {
     pub turned_edges: Finding,
     /// Faces of the mesh that others pass through.
     pub crossed: usize,
+    /// [Radius](super::Mesh::point_radius_m) with which a point rolls over the mesh \[m\].
+    pub point_radius_m: f64,
     /// Faces of the mesh that lie beside other parts.
     pub narrow_gaps: NarrowGaps,
     /// Rims of the mesh that are whole loops, with their sizes.
@@ -220,9 +222,16 @@ impl fmt::Display for MeshReport {
             let faces = plural(self.crossed, "face", "faces");
             write!(
                 f,
-                "\n{} {faces} that others cross or touch: felt as far as they are outside of these",
+                "\n{} {faces} that others cross or touch: felt as far as they are outside of what is closed",
                 self.crossed
             )?;
+            if self.point_radius_m > 0.0 {
+                write!(
+                    f,
+                    "; a finger of radius 0 rolls over this mesh as a ball of {:.2e} m, since open parts cross others",
+                    self.point_radius_m
+                )?;
+            }
         }
         if self.narrow_gaps.faces > 0 {
             write!(f, "\n{}", self.narrow_gaps)?;

@@ -101,6 +101,10 @@ impl Ground for Mesh {
         vicinity.is_clear(self, centre_B, normal_B, near_m, moved_m)
     }
 
+    fn crossed_at(&self, [from_B, to_B]: [&Vector3<f64>; 2]) -> Option<f64> {
+        self.first_crossing(from_B, to_B).map(|hit| hit.fraction)
+    }
+
     fn room_m(&self, centre_B: &Vector3<f64>, radius_m: f64, ahead_m: f64) -> Option<f64> {
         let near = self.nearest_within(centre_B, radius_m + ahead_m).ok()?;
         Some(near.map_or(ahead_m, |near| near.distance_m - radius_m))

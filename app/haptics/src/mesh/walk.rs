@@ -32,7 +32,7 @@ use nalgebra::Vector3;
 use super::Mesh;
 use super::bvh::Leaving;
 use super::crack::{self, Beyond};
-use super::crossing::{follow_crossing, leaves_sheet, meet_others, plane_at_crossing, still_crossing};
+use super::crossing::{follow_crossing, meet_others, plane_at_crossing};
 use super::draw::{Draw, Drawn};
 use super::facing::facing;
 use super::ledge::off_ledge;
@@ -97,7 +97,7 @@ pub(crate) fn stand(mesh: &Mesh, mut place: Place, input: &ConeInput) -> Option<
             return Some((place, TangentView::new(&place.point_B, normal_B, offset_m, input)));
         }
         if let Some(rim) = rim(mesh, place) {
-            place = rim.with_crossing(place.crossing());
+            place = rim;
             continue;
         }
         match leave(mesh, place, hip_B)? {
@@ -159,12 +159,9 @@ pub(crate) fn walk(
                 return Some(rest(place, &(start_B - place.point_B), changes, draw, input));
             }
         }
-        let still = still_crossing(mesh, &place, &reached.place().point_B);
         match reached {
-            Reached::Target(there) => {
-                return Some(Walked { place: there.with_crossing(still), view, tangential_B, changes });
-            }
-            Reached::Rim(there) => (place, view) = stand(mesh, there.with_crossing(still), input)?,
+            Reached::Target(place) => return Some(Walked { place, view, tangential_B, changes }),
+            Reached::Rim(place_there) => (place, view) = stand(mesh, place_there, input)?,
         }
     }
 }
@@ -286,22 +283,19 @@ fn fly(mesh: &Mesh, place: Place, hip_B: Vector3<f64>) -> Option<Place> {
     let vertices_of = |face: u32| mesh.faces[face as usize].vertices;
     let way_B = [&place.point_B, &hip_B];
     let leaving = &Left { mesh, on: place.on };
-    let sheet = |face| leaves_sheet(mesh, &place, &(hip_B - place.point_B), face);
     let hit = match place.on {
-        On::Face(_) => mesh.first_hit_in_flight(way_B, leaving, |face| face == side.face || sheet(face)),
+        On::Face(_) => mesh.first_hit_in_flight(way_B, leaving, |face| face == side.face),
         On::Edge(_, edge) => {
             let ends = [edge, next(edge)].map(|corner| facet.face.vertices[corner]);
             let has_both = |face| ends.iter().all(|end| vertices_of(face).contains(end));
-            mesh.first_hit_in_flight(way_B, leaving, |face| has_both(face) || sheet(face))
+            mesh.first_hit_in_flight(way_B, leaving, has_both)
         }
         On::Vertex(_, corner) => {
             let tip = facet.face.vertices[corner];
-            let has_tip = |face| vertices_of(face).contains(&tip);
-            mesh.first_hit_in_flight(way_B, leaving, |face| has_tip(face) || sheet(face))
+            mesh.first_hit_in_flight(way_B, leaving, |face| vertices_of(face).contains(&tip))
         }
         On::Crossing(_, other) => {
-            let is_crossed = |face| face == side.face || face == other.face;
-            mesh.first_hit_in_flight(way_B, leaving, |face| is_crossed(face) || sheet(face))
+            mesh.first_hit_in_flight(way_B, leaving, |face| face == side.face || face == other.face)
         }
     };
     hit.map(|hit| Place::hit(&hit))

@@ -4,15 +4,16 @@
 //! is first touched, found by the false position. Through free space it leaps as far as nothing is near.
 //!
 //! Invariants: a move begins and ends where nothing is nearer than r; over a surface it is no longer than half of r, so
-//! that the centre, with room of r around it, cannot come to the other side of anything.
+//! that the centre, with room of r around it, cannot come to the other side of anything, or its way goes through nothing.
 //! Cost: one bounded query; at something new some ten walks of a foot more.
 
 use std::cell::Cell;
 
 use nalgebra::Vector3;
 
-use super::ball::{Ball, tolerance_m};
+use super::ball::{Ball, Rest, tolerance_m};
 use super::ground::{Foot, Ground};
+use super::roll::Leg;
 use crate::mesh::TooMany;
 
 /// What was done in a tick already, in places that were looked at.
@@ -76,28 +77,93 @@ impl<F: Foot> Ball<F> {
         if is_clear { Ok(None) } else { self.obstacle(ground) }
     }
 
-    /// As [`Self::rolled_to`], as far as nothing else is in the way; by half of its radius at the most.
-    pub(super) fn rolled_until(
+    /// As [`Self::rolled_to`], as far as nothing else is in the way: by half of its radius at the most, or as far as it can see on the
+    /// flat faces that it rests on.
+    pub(super) fn rolled_until<G: Ground<Foot = F>>(
         &self,
-        ground: &impl Ground<Foot = F>,
+        ground: &G,
         target_B: &Vector3<f64>,
         work: &Work,
     ) -> Self {
         let way_B = target_B - self.centre_B;
         let way_m = way_B.norm();
         let longest_m = 0.5 * self.radius_m;
+        if let Some(ball) = self.slid_far(ground, &way_B, way_m, work) {
+            return ball;
+        }
         let way_B = if way_m > longest_m { way_B * (longest_m / way_m) } else { way_B };
-        self.first_touch(ground, work, |share| self.rolled_to(ground, &(self.centre_B + way_B * share)))
-            .unwrap_or(*self)
+        let touched = self
+            .first_touch(ground, work, |share| self.rolled_to(ground, &(self.centre_B + way_B * share)))
+            .unwrap_or(*self);
+        let moved_m = (touched.centre_B - self.centre_B).amax();
+        if G::IS_BENT || moved_m > tolerance_m(ground, self.radius_m) || touched.count != self.count {
+            return touched;
+        }
+        // At the foot of a fold so flat that what lies beyond is no other foot from here.
+        let way = Leg { from_B: self.centre_B, is_frictionless: true };
+        let beyond = self.in_the_fold(ground, &(self.centre_B + way_B), &way);
+        let is_there = beyond.is_within_half_a_radius_of(self) && matches!(beyond.obstacle(ground), Ok(None));
+        if is_there { beyond } else { *self }
+    }
+
+    /// A long way along the flat faces and straight edges that it rests on, if it stands for a point: its centre goes straight, and
+    /// through nothing; and where it comes to nothing is nearer than the radius.
+    #[inline(never)]
+    fn slid_far<G: Ground<Foot = F>>(
+        &self,
+        ground: &G,
+        way_B: &Vector3<f64>,
+        way_m: f64,
+        work: &Work,
+    ) -> Option<Self> {
+        if !self.is_as_a_point::<G>() || self.count == 0 {
+            return None;
+        }
+        let near_m = tolerance_m(ground, self.radius_m);
+        let slid = |share: f64| {
+            let ball = self.rolled_to(ground, &(self.centre_B + way_B * share));
+            let is_same = |(rest, before): (&Rest<F>, &Rest<F>)| {
+                rest.normal_B.cross(&before.normal_B).norm_squared() < SAME_PLANE * SAME_PLANE
+                    && (rest.offset_m - before.offset_m).abs() <= near_m
+            };
+            let slides = !ball.is_blocked
+                && ball.count == self.count
+                && ball.rests().iter().zip(self.rests()).all(is_same);
+            slides.then_some(ball)
+        };
+        let least = 0.5 * self.radius_m / way_m;
+        let mut far = 1.0;
+        if slid(far).is_none() {
+            let mut beyond = far;
+            far = 0.0;
+            while beyond - far > least {
+                let middle = 0.5 * (far + beyond);
+                if slid(middle).is_some() { far = middle } else { beyond = middle }
+            }
+        }
+        for _ in 0..MOST_SHORTENED {
+            if far <= least {
+                return None;
+            }
+            let ball = slid(far)?;
+            work.look();
+            let met = ground.crossed_at([&self.centre_B, &ball.centre_B]);
+            if met.is_none() && matches!(ball.obstacle(ground), Ok(None)) {
+                return Some(ball);
+            }
+            // Twice the radius before what it meets; where that is beside its way, some radii back.
+            far = far * met.unwrap_or(1.0) - 4.0 * least;
+        }
+        None
     }
 
     /// Straight to `target_B` through free space: it is there, or where it first touches something.
     ///
     /// `None` where it began with something nearer than it may be.
     #[inline(never)]
-    pub(super) fn flown_to(
+    pub(super) fn flown_to<G: Ground<Foot = F>>(
         &self,
-        ground: &impl Ground<Foot = F>,
+        ground: &G,
         target_B: &Vector3<f64>,
         flight: Flight,
     ) -> Option<Self> {
@@ -106,13 +172,18 @@ impl<F: Foot> Ball<F> {
         for _ in 0..flight.most_leaps {
             let way_B = target_B - ball.centre_B;
             let left_m = way_B.norm();
-            let ahead_m = left_m.min(flight.farthest * radius_m);
+            let ahead_m = left_m.min((flight.farthest * radius_m).max(LEAST_AHEAD_M));
             let safe_m = ground.room_m(&ball.centre_B, radius_m, ahead_m)?;
             if safe_m >= left_m {
                 return Some(Self::in_free_space(*target_B, radius_m));
             }
             if safe_m < -2.0 * tolerance_m(ground, radius_m) {
                 return None;
+            }
+            if ball.is_as_a_point::<G>()
+                && let Some(flown) = ball.flown_far(ground, &way_B, left_m)
+            {
+                return Some(flown);
             }
             // Along a surface nothing is safe: some way, and a look back.
             let leap_m = safe_m.max(SHORTEST_LEAP * radius_m).min(left_m);
@@ -126,6 +197,28 @@ impl<F: Foot> Ball<F> {
             }
         }
         Some(ball)
+    }
+
+    /// A long way through free space, to its end or to the surface that its centre would go through.
+    fn flown_far(&self, ground: &impl Ground<Foot = F>, way_B: &Vector3<f64>, way_m: f64) -> Option<Self> {
+        let target_B = self.centre_B + way_B;
+        let far_m = ground
+            .crossed_at([&self.centre_B, &target_B])
+            .map_or(way_m, |share| share * way_m - 0.5 * self.radius_m);
+        if far_m <= LONG * self.radius_m {
+            return None;
+        }
+        let (from_B, leap_B) = (self.centre_B, way_B * (far_m / way_m));
+        let ball = self.first_touch(ground, &Work::default(), |share| {
+            Self::in_free_space(from_B + leap_B * share, self.radius_m)
+        })?;
+        (ball.count > 0 || far_m >= way_m).then_some(ball)
+    }
+
+    /// Whether it stands for a point: by what comes nearer on its way than its radius nobody is stopped, but by what its centre
+    /// would go through.
+    fn is_as_a_point<G: Ground>(&self) -> bool {
+        !G::IS_BENT && self.radius_m <= AS_A_POINT_M
     }
 
     /// The end of a path, or where on it something new is first touched; `None` if that cannot be told.
@@ -202,7 +295,17 @@ fn touching<F: Foot>(
     best
 }
 
+/// As far is looked ahead at least \[m\]: of a small ball that costs no more.
+const LEAST_AHEAD_M: f64 = 1e-3;
 const SHORTEST_LEAP: f64 = 0.375;
+/// Radius of balls that stand for points, at most \[m\].
+const AS_A_POINT_M: f64 = 1.5e-5;
+/// In radii: shorter ways are gone in halves of the radius.
+const LONG: f64 = 4.0;
+/// How often a way along flat faces is shortened.
+const MOST_SHORTENED: u32 = 3;
+/// Sine of the angle below which planes are the same one.
+const SAME_PLANE: f64 = 1e-10;
 const MOST_OBSTACLES: usize = 6;
 /// Enough for a finger to roll on over plain faces for as many halves of its radius as there are rounds.
 const MOST_WORK: u32 = 64;

@@ -82,6 +82,10 @@ pub(crate) trait Ground {
         moved_m: f64,
     ) -> bool;
 
+    /// Share of the way after which it first goes through the surface, from either side; `None`: nowhere on it, if the ground can tell
+    /// that at all.
+    fn crossed_at(&self, way_B: [&Vector3<f64>; 2]) -> Option<f64>;
+
     /// How far a free ball can go whichever way, as far as `ahead_m` matters; negative where it is too near \[m\].
     fn room_m(&self, centre_B: &Vector3<f64>, radius_m: f64, ahead_m: f64) -> Option<f64>;
 

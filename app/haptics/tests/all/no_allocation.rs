@@ -6,7 +6,7 @@ use crate::{common, counting, solids, trees};
 use common::flawed;
 use common::*;
 use counting::CALLS;
-use haptics::mesh::{Mesh, make};
+use haptics::mesh::{self, Mesh, make};
 use haptics::passivity::{Passivity, PassivitySpec, Port};
 use haptics::{Finger, Friction, Nurbs, Shading, nurbs};
 use nalgebra::Vector3;
@@ -15,7 +15,20 @@ use nalgebra::Vector3;
 fn a_step_on_a_mesh_never_allocates() {
     let bumpy = std::sync::Arc::new(Mesh::build(make::bumpy_sphere(100, 51, 0.02)).unwrap().0);
     let knot = std::sync::Arc::new(Mesh::build(make::klein_bottle(40, 20, 0.04)).unwrap().0);
-    let entities = [entity(bumpy, stiction()), entity(knot, Friction::coulomb(0.3).unwrap())];
+    // Over sheets that cross a point rolls.
+    let corners = [[-0.03, 0.0, -0.03], [-0.03, 0.0, 0.03], [0.03, 0.0, 0.03], [0.03, 0.0, -0.03]];
+    let sheet = |turn: f64| {
+        let faces = vec![[0, 1, 2], [0, 2, 3]];
+        let soup = mesh::TriangleSoup { vertices: corners.map(Vector3::from).to_vec(), faces };
+        flawed::turned(soup, [0.0, 0.0, turn])
+    };
+    let crossing = std::sync::Arc::new(Mesh::build(flawed::together([sheet(0.1), sheet(1.4)])).unwrap().0);
+    assert!(crossing.point_radius_m() > 0.0);
+    let entities = [
+        entity(bumpy, stiction()),
+        entity(knot, Friction::coulomb(0.3).unwrap()),
+        entity(crossing, stiction()),
+    ];
     let mut finger = Finger::new(0.0, entities.len()).unwrap();
     let mut noise = Noise(10);
     let (mut free, mut stuck, mut slid) = (0, 0, 0);

@@ -17,6 +17,7 @@ mod csg_oracle;
 mod csg_starts;
 mod deep;
 mod feet;
+mod fine;
 mod forms;
 mod mesh;
 mod quality;

@@ -11,6 +11,7 @@ mod build;
 mod convexity;
 mod cracks;
 mod crossing;
+mod crossing_sheets;
 mod energy;
 mod folds;
 mod friction;

@@ -1,0 +1,311 @@
+//! Open parts that cross: a point on one of them meets the others, and is let go on the side from which it came.
+#![allow(non_snake_case)]
+
+use std::sync::Arc;
+
+use crate::common::meshes::*;
+use crate::common::*;
+use haptics::mesh::{Mesh, TriangleSoup, make};
+use haptics::{Entity, Finger, FingerOutput, Friction};
+use nalgebra::{Isometry3, UnitQuaternion, Vector3};
+
+/// A mesh of four-cornered sheets, each a part of its own.
+fn quads(quads: &[[[f64; 3]; 4]]) -> TriangleSoup {
+    let mut all = TriangleSoup::default();
+    for corners in quads {
+        let first = all.vertices.len() as u32;
+        all.vertices.extend(corners.iter().copied().map(Vector3::from));
+        all.faces.extend([[first, first + 1, first + 2], [first, first + 2, first + 3]]);
+    }
+    all
+}
+
+fn with(mut all: TriangleSoup, other: TriangleSoup) -> TriangleSoup {
+    let first = all.vertices.len() as u32;
+    all.vertices.extend(other.vertices);
+    all.faces.extend(other.faces.iter().map(|face| face.map(|corner| corner + first)));
+    all
+}
+
+fn turned(mut soup: TriangleSoup, turn: &Isometry3<f64>) -> TriangleSoup {
+    soup.vertices.iter_mut().for_each(|at| *at = (turn * nalgebra::Point3::from(*at)).coords);
+    soup
+}
+
+const FLOOR: [[f64; 3]; 4] = [[-0.05, 0.0, -0.05], [-0.05, 0.0, 0.05], [0.05, 0.0, 0.05], [0.05, 0.0, -0.05]];
+
+/// Through these places at 0.1 m/s.
+fn stroke(finger: &mut Finger, entity: &Entity, places: &[Vector3<f64>]) -> FingerOutput {
+    let mut last = step(finger, entity, &places[0]);
+    for (from, to) in places.iter().zip(&places[1..]) {
+        let ticks = ((to - from).norm() / 1e-4).ceil().max(1.0);
+        for tick in 1..=ticks as u32 {
+            last = step(finger, entity, &(from + (to - from) * (f64::from(tick) / ticks)));
+        }
+    }
+    last
+}
+
+/// What a point feels at the end of a stroke, and what a ball of 0.1 mm does.
+fn felt(mesh: &Arc<Mesh>, places: &[Vector3<f64>]) -> [FingerOutput; 2] {
+    let entity = touchable(mesh, Friction::None);
+    [0.0, 1e-4].map(|radius_m| stroke(&mut finger(radius_m), &entity, places))
+}
+
+/// A wall of two sheets with an upright edge between them, and tubes of four.
+#[test]
+fn around_the_upright_edges_of_an_open_wall_a_finger_is_let_go() {
+    let corner = [[-0.02, 0.0], [0.0, 0.0], [0.0, -0.02]];
+    let tube = [[-0.02, 0.0], [0.0, 0.0], [0.0, -0.02], [-0.02, -0.02], [-0.02, 0.0]];
+    let walls = |outline: &[[f64; 2]]| {
+        let mut all = TriangleSoup::default();
+        all.vertices.extend(outline.iter().flat_map(|[x, z]| [-0.01, 0.03].map(|y| Vector3::new(*x, y, *z))));
+        let sides = 0..outline.len() as u32 - 1;
+        all.faces.extend(sides.flat_map(|at| {
+            let [a, b, c, d] = [2 * at, 2 * at + 2, 2 * at + 3, 2 * at + 1];
+            [[a, b, c], [a, c, d]]
+        }));
+        all
+    };
+    // Along one of its walls, around the edge, and away.
+    let strokes: [&[[f64; 3]]; 3] = [
+        &[
+            [-0.01, 0.01, 0.02],
+            [-0.01, -1e-3, 0.02],
+            [-0.0102, -1e-3, -0.002],
+            [0.002, -1e-3, -0.0021],
+            [0.02, -1e-3, -0.0105],
+            [0.03, 0.03, -0.01],
+        ],
+        &[
+            [0.02, 0.01, -0.01],
+            [0.02, -1e-3, -0.01],
+            [-0.002, -1e-3, -0.0102],
+            [-0.0021, -1e-3, 0.002],
+            [-0.0105, -1e-3, 0.02],
+            [-0.01, 0.03, 0.03],
+        ],
+        &[
+            [0.02, 0.01, 0.015],
+            [0.02, -1e-3, 0.015],
+            [-0.005, -1e-3, -0.004],
+            [0.02, -1e-3, -0.013],
+            [0.03, 0.03, -0.01],
+        ],
+    ];
+    for case in 0..20 {
+        let turn = UnitQuaternion::from_axis_angle(&Vector3::y_axis(), 0.1 + 0.3 * f64::from(case));
+        let turn = Isometry3::from_parts(Vector3::new(0.0013, 0.0, -0.0007).into(), turn);
+        let floor = || if case % 2 == 0 { quads(&[FLOOR]) } else { moved_cuboid() };
+        for outline in [&corner[..], &tube] {
+            let mesh = built(with(floor(), turned(walls(outline), &turn)));
+            for (number, stroke) in strokes.iter().enumerate() {
+                let places: Vec<_> =
+                    stroke.iter().map(|at| (turn * nalgebra::Point3::from(*at)).coords).collect();
+                let met = &places[..4.min(places.len() - 1)];
+                let [point, ball] = felt(&mesh, &met[..3]);
+                let difference = (point.force_on_user_W - ball.force_on_user_W).norm();
+                // A ball is pushed by its radius more, by each of three walls.
+                assert!(difference < 3.0 * K * 1e-4, "{case} {number}: {point:?} {ball:?}");
+                assert!(ball.force_on_user_W.norm() > 1.5 * K * 1e-3, "{case} {number}: {ball:?}");
+                let [point, ball] = felt(&mesh, &places);
+                assert!(point.entity.is_none() && ball.entity.is_none(), "{case} {number}: {point:?}");
+            }
+        }
+    }
+}
+
+fn moved_cuboid() -> TriangleSoup {
+    turned(make::cuboid([0.1, 0.04, 0.1]), &Isometry3::translation(0.0, -0.02, 0.0))
+}
+
+/// A wall that leans, with rims that are slanted: along its foot to the end, off it, and away.
+#[test]
+fn at_the_end_of_a_leaning_wall_a_finger_is_let_go() {
+    for lean in [-60.0_f64, -45.0, -20.0, 0.0, 20.0, 45.0, 60.0] {
+        for slant in [-45.0_f64, 45.0] {
+            let [lean, slant] = [lean, slant].map(|angle| angle.to_radians().tan());
+            let at = |y: f64, z: f64| [y * lean, y, z + y * slant];
+            let wall = [at(-0.01, -0.015), at(-0.01, 0.015), at(0.02, 0.015), at(0.02, -0.015)];
+            for floor in [quads(&[FLOOR]), moved_cuboid()] {
+                let mesh = built(with(floor, quads(&[wall])));
+                for side in [1.0, -1.0] {
+                    let way = [
+                        [0.02, 0.01, 0.0],
+                        [0.02, -1e-3, 0.0],
+                        [-0.002, -1e-3, 0.0],
+                        [-0.002, -1e-3, 0.017],
+                        [-0.002, -1e-3, 0.03],
+                        [-0.03, -1e-3, 0.03],
+                        [-0.04, 0.03, 0.04],
+                    ];
+                    let places = way.map(|[x, y, z]| Vector3::new(side * x, y, z));
+                    let [point, ball] = felt(&mesh, &places);
+                    let told = || format!("{lean} {slant} {side}: {point:?} {ball:?}");
+                    assert!(point.entity.is_none() && ball.entity.is_none(), "{}", told());
+                }
+            }
+        }
+    }
+}
+
+/// Several sheets through one upright line, as trees of pictures are made: into the wedge between two of them, and out again.
+#[test]
+fn in_the_wedge_of_sheets_that_cross_in_one_line_a_finger_is_let_go() {
+    for count in [2, 3, 4, 6] {
+        let sheet = |number: u32| {
+            let angle = 0.2 + std::f64::consts::PI * f64::from(number) / f64::from(count);
+            let at = |along: f64, y: f64| [along * angle.cos(), y, along * angle.sin()];
+            [at(-0.03, -0.01), at(0.03, -0.01), at(0.03, 0.03), at(-0.03, 0.03)]
+        };
+        let sheets = quads(&(0..count).map(sheet).collect::<Vec<_>>());
+        let floors = [Some(quads(&[FLOOR])), Some(moved_cuboid()), None];
+        for (number, floor) in floors.into_iter().enumerate() {
+            let has_floor = floor.is_some();
+            let mesh = built(with(floor.unwrap_or_default(), sheets.clone()));
+            for wedge in 0..count {
+                let angle = 0.2 + std::f64::consts::PI * (f64::from(wedge) + 0.5) / f64::from(count);
+                let at = |along: f64, aside: f64, y: f64| {
+                    Vector3::new(
+                        along * angle.cos() - aside * angle.sin(),
+                        y,
+                        along * angle.sin() + aside * angle.cos(),
+                    )
+                };
+                let into = [at(0.025, 0.0, 0.01), at(0.025, 0.0, -1e-3), at(-0.012, 1e-3, -1e-3)];
+                let [point, ball] = felt(&mesh, &into);
+                assert!(ball.force_on_user_W.norm() > 5e-3 * K, "{count} {number} {wedge}: {ball:?}");
+                let difference = (point.force_on_user_W - ball.force_on_user_W).norm();
+                // In a wedge of the angle a, a ball is held as far before the line as its radius over sin(a / 2).
+                let half = 0.5 * std::f64::consts::PI / f64::from(count);
+                let most_m = 1e-4 * (1.0 + 1.0 / half.sin());
+                assert!(difference < K * most_m, "{count} {number} {wedge}: {point:?} {ball:?}");
+                for out in [at(0.04, 0.0, -1e-3), at(0.03, 0.0, 0.04)] {
+                    let mut places = into.to_vec();
+                    places.push(out);
+                    let [point, _] = felt(&mesh, &places);
+                    let on_floor_n = if has_floor { K * (-out.y).max(0.0) } else { 0.0 };
+                    let off_n = (point.force_on_user_W.norm() - on_floor_n).abs();
+                    assert!(off_n < 1e-6, "{count} {number} {wedge}: {point:?}");
+                }
+            }
+        }
+    }
+}
+
+/// More leaves than are looked at, somewhere else in the mesh: a wall holds as before.
+#[test]
+fn a_wall_holds_beside_a_heap_of_leaves() {
+    let mut noise = Noise(3);
+    let mut leaves = Vec::new();
+    for _ in 0..1100 {
+        let turn = UnitQuaternion::new(noise.vector(2.0));
+        let corner = |x: f64, z: f64| (Vector3::x() * 0.2 + turn * Vector3::new(x, 0.0, z)).into();
+        leaves.push([corner(-0.02, -0.02), corner(-0.02, 0.02), corner(0.02, 0.02), corner(0.02, -0.02)]);
+    }
+    let wall = [[0.0, -0.01, -0.03], [0.0, -0.01, 0.03], [0.0, 0.03, 0.03], [0.0, 0.03, -0.03]];
+    let mesh = built(with(quads(&leaves), quads(&[FLOOR, wall])));
+    let places = [[-0.02, 0.01, 1e-3], [-0.02, -1e-3, 1e-3], [0.01, -1e-3, 1e-3]].map(Vector3::from);
+    let [point, _] = felt(&mesh, &places);
+    assert!((point.force_on_user_W - Vector3::new(-0.01, 1e-3, 0.0) * K).norm() < 1e-4 * K, "{point:?}");
+    let places: Vec<_> = places.into_iter().chain([Vector3::new(-0.03, 0.01, 1e-3)]).collect();
+    let [point, _] = felt(&mesh, &places);
+    assert!(point.entity.is_none(), "{point:?}");
+}
+
+/// A point that rolls is where it would be if nothing crossed the surface elsewhere, however fast it goes: over flat faces and round
+/// ones, and along their edges.
+#[test]
+fn a_point_that_rolls_feels_what_one_that_walks_does() {
+    let wall = [[0.055, -0.01, -0.04], [0.055, -0.01, 0.04], [0.06, 0.03, 0.04], [0.06, 0.03, -0.04]];
+    let far = || quads(&[wall, wall.map(|[x, y, z]| [x + 0.5 * z, y, z])]);
+    let flat = |_: f64, _: f64| 0.0;
+    let dome = |x: f64, z: f64| (0.08_f64.powi(2) - x * x - z * z).sqrt() - 0.08;
+    let ridges = |x: f64, _: f64| 2e-3 - 2.0 * (x.rem_euclid(8e-3) - 4e-3).abs();
+    for (name, soup, ways_m) in [
+        ("flat", surface(1, flat), [1e-4, 1e-3, 4e-3]),
+        ("flat", surface(40, flat), [1e-4, 1e-3, 4e-3]),
+        ("dome", surface(50, dome), [1e-4, 5e-4, 1e-3]),
+        ("ridges", surface(50, ridges), [1e-4, 5e-4, 1e-3]),
+    ] {
+        for scale in [1.0, 0.1] {
+            let scaled = |mut soup: TriangleSoup| {
+                soup.vertices.iter_mut().for_each(|at| *at *= scale);
+                soup
+            };
+            let [rolled, walked] = [with(soup.clone(), far()), soup.clone()].map(|soup| built(scaled(soup)));
+            assert!(rolled.point_radius_m() > 0.0 && walked.point_radius_m() == 0.0);
+            for (friction, is_along, way_m) in
+                [Friction::None, Friction::coulomb(0.4).unwrap()].into_iter().flat_map(|friction| {
+                    [true, false].into_iter().flat_map(move |is_along| {
+                        let friction = friction.clone();
+                        ways_m.into_iter().map(move |way_m| (friction.clone(), is_along, way_m * scale))
+                    })
+                })
+            {
+                let [mut one, mut other] = [0; 2].map(|_| finger(0.0));
+                let entities = [&rolled, &walked].map(|mesh| touchable(mesh, friction.clone()));
+                let mut noise = Noise(11);
+                let mut hip = Vector3::new(0.0, 2e-3, 0.0) * scale;
+                let mut aim = hip;
+                // In a groove it is rubbed by both walls.
+                if name == "ridges" && !matches!(friction, Friction::None) {
+                    continue;
+                }
+                let mut touched = 0;
+                for tick in 0..2000 {
+                    if (aim - hip).norm() < way_m {
+                        // Along edges, or anywhere.
+                        let z = if is_along { 0.0 } else { noise.between(-0.015, 0.015) };
+                        let x = noise.between(-0.015, 0.015);
+                        let height = if name == "dome" { dome(x, z) } else { 0.0 };
+                        aim = Vector3::new(x, height + noise.between(-2e-3, 5e-4), z) * scale;
+                    }
+                    hip += (aim - hip) * (way_m / (aim - hip).norm()).min(1.0);
+                    let [rolls, walks] = [(&mut one, &entities[0]), (&mut other, &entities[1])]
+                        .map(|(finger, entity)| step(finger, entity, &hip));
+                    touched += u32::from(walks.entity.is_some());
+                    let difference = (rolls.force_on_user_W - walks.force_on_user_W).norm() / K;
+                    // Ten of its radii: it rounds edges, and where it is dragged over them it sticks and slips elsewhere.
+                    let told = || {
+                        format!("{name} {scale} {friction:?} {way_m}, {tick}: {rolls:?} {walks:?} {hip:?}")
+                    };
+                    assert!(difference < 1e-4 * scale, "{}", told());
+                }
+                assert!(touched > 200, "{name} {scale} {friction:?} {way_m}: {touched}");
+            }
+        }
+    }
+}
+
+/// Of so many cells each way, of such a height.
+fn surface(cells: u32, height: impl Fn(f64, f64) -> f64) -> TriangleSoup {
+    let at = |place: u32| 0.1 * (f64::from(place) / f64::from(cells) - 0.5);
+    let mut all = TriangleSoup::default();
+    let places = (0..=cells).flat_map(|i| (0..=cells).map(move |j| [at(i), at(j)]));
+    all.vertices.extend(places.map(|[x, z]| Vector3::new(x, height(x, z), z)));
+    for (i, j) in (0..cells).flat_map(|i| (0..cells).map(move |j| (i, j))) {
+        let [a, b] = [i * (cells + 1) + j, (i + 1) * (cells + 1) + j];
+        all.faces.extend([[a, a + 1, b + 1], [a, b + 1, b]]);
+    }
+    all
+}
+
+/// Each mesh is a floor and a wall of its own; the walls are behind one another.
+#[test]
+fn a_finger_comes_to_the_walls_of_as_many_meshes_as_it_has_room_for() {
+    const MESHES: usize = 30;
+    let wall = |x: f64| [[x, -0.01, -0.03], [x, -0.01, 0.03], [x, 0.03, 0.03], [x, 0.03, -0.03]];
+    let mesh = |number: usize| built(quads(&[FLOOR, wall(2e-4 * number as f64)]));
+    let entities: Vec<Entity> = (0..MESHES).map(|number| touchable(&mesh(number), Friction::None)).collect();
+    let finger = Finger::new(0.0, MESHES).unwrap().with_ramp_in(0.0).unwrap();
+    let mut finger = finger.with_room_for(&entities);
+    let mut force_W = Vector3::zeros();
+    for tick in 0..400 {
+        let x = -0.02 + 1e-4 * f64::from(tick);
+        let hip = Vector3::new(x, if tick == 0 { 1e-3 } else { -1e-3 }, 1e-3);
+        force_W = finger.step(&entities, &hip, 1e-3).force_on_user_W;
+    }
+    let pushed_m: f64 = (0..MESHES).map(|number| 0.0199 - 2e-4 * number as f64).sum();
+    assert!((force_W.x + K * pushed_m).abs() < 1e-6 * K, "{force_W:?}");
+}
