@@ -51,30 +51,51 @@ impl BroadPhase {
     /// Takes note of an entity that moved by itself, and will move so much (m) in the next tick: it is in its box then, too.
     /// Says whether that changed.
     pub fn moved(&mut self, index: usize, entity: &Entity, way_W: &Vector3<f64>) -> bool {
-        let ticks = (AHEAD_M / way_W.norm()).clamp(LEAST_TICKS_AHEAD, MOST_TICKS_AHEAD);
-        self.changed(index, entity, way_W, &(way_W * ticks))
+        self.put_unless(index, entity, |around, tight| around.contains(&tight.swept(way_W)), way_W)
+    }
+
+    /// As [`Self::moved`], where the box may have been made [larger](Self::may_go).
+    pub fn shrink(&mut self, index: usize, entity: &Entity, way_W: &Vector3<f64>) -> bool {
+        self.put_unless(index, entity, |_, _| false, way_W)
+    }
+
+    /// Takes note of an entity that may go so far (m) in this tick, wherever to. Says whether its box changed.
+    pub fn may_go(&mut self, index: usize, entity: &Entity, way_m: f64) -> bool {
+        let is_within = |around: &Aabb, tight: &Aabb| around.contains(&tight.grown(way_m));
+        self.change(index, entity, is_within, |tight| tight.grown(FAT_M + way_m))
     }
 
     /// Takes note of an entity that was put somewhere else, and will be moved by this (m). Says whether its box changed.
     pub fn was_put(&mut self, index: usize, entity: &Entity, ahead_W: &Vector3<f64>) -> bool {
-        self.changed(index, entity, &Vector3::zeros(), ahead_W)
+        self.change(index, entity, Aabb::contains, |tight| tight.grown(FAT_M).swept(ahead_W))
     }
 
-    fn changed(
+    fn put_unless(
         &mut self,
         index: usize,
         entity: &Entity,
-        least_W: &Vector3<f64>,
-        ahead_W: &Vector3<f64>,
+        stays: impl Fn(&Aabb, &Aabb) -> bool,
+        way_W: &Vector3<f64>,
+    ) -> bool {
+        let ticks = (AHEAD_M / way_W.norm()).clamp(LEAST_TICKS_AHEAD, MOST_TICKS_AHEAD);
+        self.change(index, entity, stays, |tight| tight.grown(FAT_M).swept(&(way_W * ticks)))
+    }
+
+    /// Puts an entity into another box, unless it stays in its own, by that and the tight one.
+    fn change(
+        &mut self,
+        index: usize,
+        entity: &Entity,
+        stays: impl Fn(&Aabb, &Aabb) -> bool,
+        fat: impl Fn(&Aabb) -> Aabb,
     ) -> bool {
         let Some(Some(leaf)) = self.leaves.get(index).copied() else { return false };
         let Some(tight) = Aabb::of_entity(entity) else { return false };
-        if self.tree.around(leaf).contains(&tight.swept(least_W)) {
+        if stays(self.tree.around(leaf), &tight) {
             return false;
         }
         self.tree.remove(leaf);
-        let fat = tight.grown(FAT_M).swept(ahead_W);
-        self.leaves[index] = self.tree.insert(index as u32, fat);
+        self.leaves[index] = self.tree.insert(index as u32, fat(&tight));
         self.version += 1;
         true
     }

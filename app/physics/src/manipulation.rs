@@ -15,6 +15,7 @@ mod parcel;
 mod pressing;
 mod rest;
 mod room;
+mod struck;
 
 pub use driven::MAX_DRIVEN;
 pub use made::{Made, Parked, Reason};
@@ -43,6 +44,7 @@ use crate::sleep::Sets;
 use crate::solver::{Motion, Solved};
 use crate::touch::Touch;
 use room::{RowCounts, RowRoom};
+use struck::{IN_A_ROW, Struck};
 
 /// All bodies, and what they remember of where they touch. There is no copy of one: it would not have its room.
 #[derive(Debug)]
@@ -65,6 +67,7 @@ pub struct Manipulation {
     /// By how much each of them changes its motion in the tick without contacts.
     changes: Vec<Motion>,
     speeds_m_s: Vec<f64>,
+    struck: Struck,
     /// Of each body, what a tick took from it \[J\].
     spare_j: Vec<f64>,
     /// Of each island, what impulses put into it in a tick \[J\].
@@ -170,6 +173,7 @@ impl Manipulation {
             motions: Vec::with_capacity(places),
             changes: Vec::with_capacity(places),
             speeds_m_s: Vec::with_capacity(places),
+            struck: Struck::new(count, places),
             spare_j: Vec::with_capacity(places),
             impulses_j: Vec::with_capacity(places),
             hand: Hand::new(&[], count),
@@ -253,6 +257,10 @@ impl Manipulation {
         if !(dt_s > 0.0 && dt_s.is_finite()) {
             return Made::default();
         }
+        if self.ticks == 0 {
+            // How long a tick is nobody knew before.
+            self.keep_up(entities, dt_s);
+        }
         self.ticks += 1;
         for touch in touches.iter() {
             self.wake_entity(touch.entity, entities);
@@ -266,6 +274,15 @@ impl Manipulation {
             self.line_up(entities, dt_s);
         }
         self.line_up_driven(entities, dt_s);
+        for _ in 0..IN_A_ROW {
+            if !self.look_behind_struck(entities, dt_s) {
+                break;
+            }
+            if self.wake_what_is_met(entities, dt_s) {
+                self.line_up(entities, dt_s);
+                self.line_up_driven(entities, dt_s);
+            }
+        }
         let (touch_rows, pull_rows) = self.gather(entities, touches, pulls, fingers, dt_s);
         let Solved { sweeps, residual, unsolved } = self.find_forces(dt_s);
         for (touch, row) in touches.iter_mut().zip(touch_rows) {

@@ -76,6 +76,8 @@ pub(crate) struct Start<'t> {
     pub(crate) changes: &'t [Motion],
     /// The most that any point of each moves per time \[m/s\].
     pub(crate) speeds_m_s: &'t [f64],
+    /// The same if others strike it in the tick \[m/s\].
+    pub(crate) struck_m_s: &'t [f64],
     pub(crate) dt_s: f64,
     /// Whether forces are those of the end of the tick.
     pub(crate) is_implicit: bool,
@@ -131,8 +133,9 @@ impl Pair {
         let Gathered { rows, most_rows, left_out, meetings, last } = gathered;
         (self.first_row, self.rows) = (rows.len(), 0);
         let [a, b] = self.entities.map(|index| &start.entities[index]);
-        let speed_m_s = self.closing_speed(start);
-        let reach_m = REACH_M + speed_m_s * start.dt_s;
+        let speed_m_s = self.closing_speed(start.speeds_m_s);
+        let struck_m_s = self.closing_speed(start.struck_m_s);
+        let reach_m = REACH_M + struck_m_s * start.dt_s;
         if !is_near(a, b, reach_m) {
             self.pass_by();
             // Somebody has looked: whoever is found deep from now on was not placed there.
@@ -145,7 +148,7 @@ impl Pair {
         contact_points(in_A, in_B, reach_m, &mut self.memory, &mut found);
         if rows.len() > *most_rows / 2 {
             // Where room is scarce it is for what may touch in this tick.
-            found.forget_beyond(speed_m_s * start.dt_s);
+            found.forget_beyond(struck_m_s * start.dt_s);
         }
         let poses = [[&a.X_WB, &b.X_WB], [&a.previous_X_WB, &b.previous_X_WB]];
         let begins = self.count == 0;
@@ -415,10 +418,10 @@ impl Pair {
         }
     }
 
-    /// The most that A and B can come nearer to each other per time \[m/s\].
-    fn closing_speed(&self, start: &Start<'_>) -> f64 {
+    /// The most that A and B can come nearer to each other per time if they are as fast as that \[m/s\].
+    fn closing_speed(&self, speeds_m_s: &[f64]) -> f64 {
         let (a, b) = self.bodies;
-        start.speeds_m_s[a] + b.map_or(0.0, |b| start.speeds_m_s[b])
+        speeds_m_s[a] + b.map_or(0.0, |b| speeds_m_s[b])
     }
 }
 

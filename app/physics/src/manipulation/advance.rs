@@ -40,16 +40,24 @@ impl Manipulation {
 
     /// Finds who is near whom now.
     pub(super) fn keep_up(&mut self, entities: &[Entity], dt_s: f64) {
+        self.neighbours.clear();
+        self.forget_struck(entities, dt_s);
         let Self { broad_phase, roster, neighbours, is_marked, .. } = self;
-        neighbours.clear();
         for &body in roster.awake() {
             let entity = roster.entities[body];
             let way_W = roster.bodies[body].velocity_W * dt_s;
-            if broad_phase.moved(entity, &entities[entity], &way_W) {
+            if broad_phase.moved(entity, &entities[entity], &way_W)
+                && !std::mem::replace(&mut is_marked[body], true)
+            {
                 neighbours.push(body as u32);
-                is_marked[body] = true;
             }
         }
+        self.follow_neighbours(entities);
+    }
+
+    /// Begins and ends the pairs of the neighbours, which are marked; unmarks them.
+    pub(super) fn follow_neighbours(&mut self, entities: &[Entity]) {
+        let Self { broad_phase, roster, neighbours, is_marked, .. } = self;
         let who = who(roster, entities, self.contacts);
         self.pairs.follow_all(neighbours, is_marked, &who, broad_phase);
         for &body in &*neighbours {

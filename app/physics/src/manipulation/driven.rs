@@ -74,7 +74,9 @@ impl Manipulation {
     pub(super) fn line_up_driven(&mut self, entities: &[Entity], dt_s: f64) {
         for &Driven { entity, to_W } in &self.driven {
             let (body, motion) = carrier(&entities[entity].X_WB, &to_W, dt_s);
-            self.speeds_m_s.push(fastest_point_m_s(&entities[entity], &body, &motion));
+            let speed_m_s = fastest_point_m_s(&entities[entity], &body, &motion);
+            self.speeds_m_s.push(speed_m_s);
+            self.struck.speeds_m_s.push(speed_m_s);
             self.bodies.push(body);
             self.entities.push(entity);
             self.motions.push(motion);

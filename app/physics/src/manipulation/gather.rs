@@ -40,6 +40,7 @@ impl Manipulation {
             self.entities.push(entity);
             self.motions.push(motion);
         }
+        self.line_up_struck();
     }
 
     /// All contact points of the tick; says which rows are whose touch and pull.
@@ -107,6 +108,7 @@ impl Manipulation {
                 motions: &self.motions,
                 changes: &self.changes,
                 speeds_m_s: &self.speeds_m_s,
+                struck_m_s: &self.struck.speeds_m_s,
                 dt_s,
                 is_implicit: self.settings.integrator.is_implicit(),
             };
@@ -165,6 +167,7 @@ impl Manipulation {
         self.bodies.push(still);
         self.entities.push(entity);
         self.speeds_m_s.push(0.0);
+        self.struck.speeds_m_s.push(0.0);
         self.entities.len() - 1
     }
 }

@@ -43,7 +43,7 @@ impl Manipulation {
                 continue;
             };
             let speed_m_s: f64 =
-                pair.iter().filter_map(|&body| self.speeds_m_s.get(self.roster.place(body)?)).sum();
+                pair.iter().filter_map(|&body| self.struck.speeds_m_s.get(self.roster.place(body)?)).sum();
             let [one, other] = pair.map(|body| &entities[self.roster.entities[body]]);
             if pair::is_near(one, other, pair::REACH_M + speed_m_s * dt_s) {
                 self.wake(sleeper, entities);

@@ -141,7 +141,7 @@ fn islands_that_come_and_go_move_like_those_that_stay_to_the_bit() {
 
 #[test]
 fn meshes_that_come_and_go_move_like_those_that_stay_to_the_bit() {
-    let bodies = come_and_go_at_random(mesh_entities(0.2), 1500);
+    let bodies = come_and_go_at_random(mesh_entities(0.1), 1500);
     assert!(bodies[3].centre_W.y < 0.2, "it fell and slid");
 }
 

@@ -272,7 +272,7 @@ fn nothing_is_gained_in_a_thousand_cages() {
     (20..300).for_each(|seed| play(seed, even_shape, Schedule { puts: true, sleeps: false }, 800, &mut seen));
     assert!(seen.placed > 5000 && seen.owed < ROUNDING, "{seen:?}");
     owe_no_more_than_turning_gives(20..300);
-    change_hands(10..150);
+    change_hands(14..150);
 }
 
 /// `d J d / 2`, where d is by how much a body that nothing touches turns faster in a tick than when it begins (J).
@@ -317,9 +317,9 @@ fn a_tick_gives_a_body_no_more_than_its_turning_does_and_that_is_owed() {
     owe_no_more_than_turning_gives(0..20);
 }
 
-/// A ball of a gram before a wall is hit by one of a kilogram, so hard that when it is seen next it is in the wall.
+/// A ball of a gram before a wall is hit by one of a kilogram, so hard that it comes to the wall within the tick.
 #[test]
-fn what_is_hit_so_hard_that_it_is_found_deep_gains_nothing() {
+fn what_is_hit_so_hard_that_it_comes_to_a_wall_within_the_tick_gains_nothing() {
     let mut deepest = 0.0_f64;
     for gap in [2e-3, 4e-3, 8e-3, 12e-3, 16e-3] {
         for is_endless in [false, true] {
@@ -359,7 +359,8 @@ fn what_is_hit_so_hard_that_it_is_found_deep_gains_nothing() {
             }
         }
     }
-    assert!(deepest > 5e-3, "{deepest}");
+    // Nobody who is in the wall has not been looked at.
+    assert_eq!(deepest, 0.0);
 }
 
 /// Sends all bodies from one that steps them to another one.
@@ -409,5 +410,5 @@ fn change_hands(seeds: Range<u64>) {
 
 #[test]
 fn what_is_held_and_owed_goes_along_when_bodies_change_hands_in_every_tick() {
-    change_hands(0..10);
+    change_hands(0..14);
 }

@@ -70,5 +70,6 @@ mod solver;
 mod spaces;
 mod stability;
 mod stack;
+mod struck;
 mod torque_free;
 mod turning_friction;
