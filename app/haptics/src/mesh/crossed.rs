@@ -36,6 +36,8 @@ impl Mesh {
         });
         let sheets = self.faces.iter().zip(&is_crossed).filter(|(face, _)| face.sides == Sides::Sheet);
         let crossed_sheets = sheets.filter(|(_, is_crossed)| **is_crossed).count();
+        // In doubt they cross.
+        do_sheets_cross |= !is_done && self.faces.iter().any(|face| face.sides == Sides::Sheet);
         self.point_radius_m = if do_sheets_cross { self.least_ball_m() } else { 0.0 };
         for (face, is_crossed) in self.faces.iter_mut().zip(is_crossed) {
             face.is_crossed = face.sides == Sides::Solid && (is_crossed || !is_done);

@@ -92,11 +92,21 @@ impl<F: Foot> Ball<F> {
             return ball;
         }
         let way_B = if way_m > longest_m { way_B * (longest_m / way_m) } else { way_B };
-        let touched = self
-            .first_touch(ground, work, |share| self.rolled_to(ground, &(self.centre_B + way_B * share)))
-            .unwrap_or(*self);
-        let moved_m = (touched.centre_B - self.centre_B).amax();
-        if G::IS_BENT || moved_m > tolerance_m(ground, self.radius_m) || touched.count != self.count {
+        let path = |from: &Self| {
+            let touched = from
+                .first_touch(ground, work, |share| from.rolled_to(ground, &(from.centre_B + way_B * share)));
+            touched.unwrap_or(*from)
+        };
+        let has_moved = |ball: &Self| {
+            let moved_m = (ball.centre_B - self.centre_B).amax();
+            moved_m > tolerance_m(ground, self.radius_m) || ball.count != self.count
+        };
+        let touched = path(self);
+        if G::IS_BENT || has_moved(&touched) {
+            return touched;
+        }
+        if let Some(touched) = self.on_what_goes_on(ground, &way_B).map(|ball| path(&ball)).filter(has_moved)
+        {
             return touched;
         }
         // At the foot of a fold so flat that what lies beyond is no other foot from here.
@@ -104,6 +114,21 @@ impl<F: Foot> Ball<F> {
         let beyond = self.in_the_fold(ground, &(self.centre_B + way_B), &way);
         let is_there = beyond.is_within_half_a_radius_of(self) && matches!(beyond.obstacle(ground), Ok(None));
         if is_there { beyond } else { *self }
+    }
+
+    /// Where it rests on the end of something that lies on another, at the same foot: on the other one instead, which is what it comes
+    /// to if it goes on.
+    fn on_what_goes_on(&self, ground: &impl Ground<Foot = F>, way_B: &Vector3<f64>) -> Option<Self> {
+        let ahead = self.rolled_to(ground, &(self.centre_B + way_B));
+        let mut ball = *self;
+        let mut other = Self::in_free_space(self.centre_B, self.radius_m).rests[0];
+        other.foot = ahead.obstacle(ground).ok()??;
+        other.walk(ground, &self.centre_B, self.radius_m, true);
+        let near_m = tolerance_m(ground, self.radius_m);
+        let is_there = |rest: &&mut Rest<F>| (rest.foot.point_B() - other.foot.point_B()).amax() <= near_m;
+        let rest = ball.rests_mut().iter_mut().find(is_there)?;
+        (rest.foot, rest.normal_B, rest.offset_m) = (other.foot, other.normal_B, other.offset_m);
+        Some(ball)
     }
 
     /// A long way along the flat faces and straight edges that it rests on, if it stands for a point: its centre goes straight, and
@@ -136,7 +161,10 @@ impl<F: Foot> Ball<F> {
         if slid(far).is_none() {
             let mut beyond = far;
             far = 0.0;
-            while beyond - far > least {
+            for _ in 0..MOST_HALVINGS {
+                if beyond - far <= least {
+                    break;
+                }
                 let middle = 0.5 * (far + beyond);
                 if slid(middle).is_some() { far = middle } else { beyond = middle }
             }
@@ -304,6 +332,8 @@ const AS_A_POINT_M: f64 = 1.5e-5;
 const LONG: f64 = 4.0;
 /// How often a way along flat faces is shortened.
 const MOST_SHORTENED: u32 = 3;
+/// How often it is halved to find where such a face ends: of a way of a metre to half of a radius.
+const MOST_HALVINGS: u32 = 20;
 /// Sine of the angle below which planes are the same one.
 const SAME_PLANE: f64 = 1e-10;
 const MOST_OBSTACLES: usize = 6;

@@ -149,6 +149,37 @@ fn at_the_end_of_a_leaning_wall_a_finger_is_let_go() {
     }
 }
 
+/// Two walls that lie on one another, of which one ends a millimetre before the other.
+#[test]
+fn past_the_ends_of_walls_that_are_one_a_finger_is_let_go() {
+    let wall = |z: f64| [[0.0, -0.01, -0.03], [0.0, -0.01, z], [0.0, 0.03, z], [0.0, 0.03, -0.03]];
+    let way = [
+        [0.03, 0.01, 7e-3],
+        [0.03, -1e-3, 7e-3],
+        [-4e-3, -1e-3, 7e-3],
+        [-4e-3, -1e-3, 0.035],
+        [-0.03, -1e-3, 0.035],
+    ];
+    let places = way.map(Vector3::from);
+    for floor in [quads(&[FLOOR]), moved_cuboid()] {
+        for cells in [1, 3] {
+            let mut other = quads(&[wall(0.029)]);
+            if cells > 1 {
+                other = surface(cells, |_, _| 0.0);
+                for at in &mut other.vertices {
+                    *at = Vector3::new(0.0, 0.01 + 0.4 * at.x, -5e-4 + 0.59 * at.z);
+                }
+            }
+            let mesh = built(with(with(floor.clone(), quads(&[wall(0.03)])), other));
+            let [point, ball] = felt(&mesh, &places[..4]);
+            for (felt, radius_m) in [(point, 0.0), (ball, 1e-4)] {
+                let on_floor_m = (felt.force_on_user_W.norm() / K - 1e-3 - radius_m).abs();
+                assert!(on_floor_m < 1e-6, "{cells}: {felt:?}");
+            }
+        }
+    }
+}
+
 /// Several sheets through one upright line, as trees of pictures are made: into the wedge between two of them, and out again.
 #[test]
 fn in_the_wedge_of_sheets_that_cross_in_one_line_a_finger_is_let_go() {

@@ -89,8 +89,8 @@ impl Manipulation {
                 let share = felt * per_kg[place] / (felt * per_kg[place] + per_kg[by]);
                 let leaves_m_s = own_m_s + 2.0 * whip * share * (own_m_s + may_m_s[by]);
                 let leaves_m_s = leaves_m_s.min(MOST_GAIN * fastest_m_s);
-                // What it reaches anyway needs no more.
-                if (leaves_m_s - may_m_s[place]) * dt_s > 0.5 * REACH_M {
+                // Nearer than its own thickness it is found before it is through anything.
+                if (leaves_m_s - may_m_s[place]) * dt_s > thickness_m(&entities[self.entities[both[place]]]) {
                     self.struck.speeds_m_s[both[place]] = leaves_m_s;
                     let body = self.roster.awake()[both[place]];
                     if self.struck.by_body_m_s[body] == 0.0 {
@@ -158,4 +158,9 @@ impl Manipulation {
             }
         }
     }
+}
+
+/// Half of the smallest size of the box around an entity \[m\].
+fn thickness_m(entity: &Entity) -> f64 {
+    Aabb::of_entity(entity).map_or(0.0, |around| 0.5 * (around.high_W - around.low_W).min())
 }
