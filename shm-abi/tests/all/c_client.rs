@@ -3,8 +3,8 @@
 use crate::common::fake::{fake_server, hear, send};
 use crate::common::{frame, info, wait_until};
 use bytemuck::Zeroable;
-use patience::limit;
 use patience::prelude::*;
+use patience::{limit, watched};
 use shm_abi::handshake::{Answer, Verdict};
 use shm_abi::server::{Server, ServerEvent};
 use shm_abi::stop_socket::Sent;
@@ -92,7 +92,9 @@ impl Driver {
     }
 
     fn poll(&mut self) {
-        self.server.poll(&self.memory, Duration::from_millis(1), &mut self.events).unwrap();
+        let Self { memory, server, events, .. } = self;
+        watched(limit(), "a turn of the server", || server.poll(memory, Duration::from_millis(1), events))
+            .unwrap();
     }
 
     fn serve_until_it_ends(&mut self, mut client: Child) -> Output {
@@ -283,7 +285,8 @@ fn a_stop_of_a_c_program_goes_through_every_kind_of_link() {
     let stops = stops_beside(&directory.path().join("a/driver.sock"));
     let send = |place: &Path| {
         let mut client = std::process::Command::new(program);
-        let output = client.current_dir(directory.path()).arg(place).arg("send-stop").bounded_output().unwrap();
+        let output =
+            client.current_dir(directory.path()).arg(place).arg("send-stop").bounded_output().unwrap();
         assert!(output.status.success(), "{}: {output:?}", place.display());
         (String::from_utf8(output.stdout).unwrap(), stops.recv(&mut [0; 16]).is_ok())
     };
@@ -307,7 +310,9 @@ fn a_c_program_that_names_no_socket_asks_nobody() {
     let Some(program) = compiled() else { return };
     let directory = tempfile::tempdir().unwrap();
     let stops = stops_beside(&directory.path().join(""));
-    let stranger = SocketAddr::from_abstract_name([0; 107]).and_then(|address| UnixListener::bind_addr(&address)).unwrap();
+    let stranger = SocketAddr::from_abstract_name([0; 107])
+        .and_then(|address| UnixListener::bind_addr(&address))
+        .unwrap();
     stranger.set_nonblocking(true).unwrap();
     let run = |arguments: &[&str]| {
         let mut client = std::process::Command::new(program);

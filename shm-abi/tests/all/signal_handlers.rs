@@ -132,7 +132,10 @@ fn what_signal_handlers_may_call_calls_only_what_is_async_signal_safe() {
         assert!(functions.contains_key(name), "the header has no {name}");
         let mut found = called_outside(name, &functions);
         found.retain(|name| !SAFE.contains(&name.as_str()) && !NO_CALLS.contains(&name.as_str()));
-        assert!(found.is_empty(), "{name} calls {found:?}, which is none of POSIX' async-signal-safe functions");
+        assert!(
+            found.is_empty(),
+            "{name} calls {found:?}, which is none of POSIX' async-signal-safe functions"
+        );
     }
 }
 

@@ -144,7 +144,11 @@ fn a_c_program_stops_the_motors_in_a_signal_handler_that_interrupts_allocations(
             wait_for("the end of the fault", || {
                 operator.start(&["clear-fault"]).end();
                 std::thread::sleep(Duration::from_millis(50));
-                operator.stand.view().read_latest().is_some_and(|frame| frame.state != DriverState::Fault as u64)
+                operator
+                    .stand
+                    .view()
+                    .read_latest()
+                    .is_some_and(|frame| frame.state != DriverState::Fault as u64)
             });
             operator.wait_for_force();
         }
