@@ -41,3 +41,14 @@ pub(crate) fn place(socket: &Path) -> String {
         format!(" --socket {}", socket.display())
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn only_a_socket_that_a_driver_program_does_not_find_by_itself_is_named() {
+        assert_eq!(place(&endpoint::for_application()), "");
+        assert_eq!(place(Path::new("/elsewhere/driver.sock")), " --socket /elsewhere/driver.sock");
+    }
+}

@@ -67,7 +67,7 @@ pub struct ReplayArgs {
     /// several times
     #[arg(long, value_name = "FILE")]
     record: Vec<PathBuf>,
-    /// End with status 1 if anything differs, be it the last bit, or the recording is cut
+    /// End with status 1 if anything differs, be it the last bit, or the recording is cut (a table: within a row)
     #[arg(long)]
     expect_same: bool,
 }

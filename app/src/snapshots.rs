@@ -8,6 +8,7 @@
 //! the run goes on to its end, which is then that of a fault.
 
 mod args;
+mod film_files;
 
 pub use args::{Film, PictureArgs, Shot, Wanted};
 
@@ -16,11 +17,11 @@ use crate::moments::Moments;
 use crate::record::backpressure::{Progress, STUCK, Wait};
 use crate::row::{BodyRow, Row};
 use crate::shown::Shown;
+use film_files::FilmFiles;
 use io_driver::say::say;
 use rt_core::limits;
 use std::collections::VecDeque;
-use std::ffi::OsStr;
-use std::os::unix::fs::MetadataExt;
+use std::fs::File;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -40,6 +41,9 @@ pub struct Snapshots {
     /// In the order of their times.
     shots: Vec<Shot>,
     film: Option<Film>,
+    files: Option<FilmFiles>,
+    /// Of the film's directory, to the end of the run.
+    claim: Option<File>,
     /// Pictures of the film that were due.
     due: u64,
     left_out: u64,
@@ -63,8 +67,8 @@ pub struct Snapshots {
 enum Work {
     /// A picture, and where to.
     Picture(Box<Moment>, PathBuf),
-    /// One of a film: a name that leads to another file ends.
-    Frame(Box<Moment>, PathBuf),
+    /// The one of a film with this number.
+    Frame(Box<Moment>, u64),
     /// Another scene goes on.
     Scene(Box<Stage>),
 }
@@ -82,6 +86,8 @@ pub struct Drawn {
     pub not_reached: usize,
     /// Pictures of an earlier, longer film in the same directory.
     pub older: usize,
+    /// Pictures of another film in the places of those that were left out or are missing.
+    pub strange: u64,
     /// Pictures that a fault cost.
     pub missing: u64,
     /// Fault that has been told: a file that could not be written, a limit, a machine that cannot draw.
@@ -103,6 +109,9 @@ impl std::fmt::Display for Drawn {
         if self.older > 0 {
             write!(f, ", {} OLDER ones of another film behind them", self.older)?;
         }
+        if self.strange > 0 {
+            write!(f, ", {} OLDER ones of another film AMONG them: they cannot be removed", self.strange)?;
+        }
         if self.missing > 0 {
             write!(f, ", {} MISSING", self.missing)?;
         }
@@ -117,7 +126,7 @@ impl Snapshots {
     /// Begins to take what is wanted of this stage. `waits`: the run's clock waits for the drawing.
     ///
     /// # Errors
-    /// A camera that the scene does not have, a directory that cannot be made, in words.
+    /// A camera that the scene does not have, a directory that cannot be made or has another run's film, in words.
     pub fn start(
         wanted: &Wanted,
         Shown { stage, moments }: Shown,
@@ -125,15 +134,15 @@ impl Snapshots {
         waits: bool,
     ) -> Result<Self, String> {
         camera_of(&stage, wanted.camera.as_deref())?;
-        if let Some(film) = &wanted.film {
-            std::fs::create_dir_all(&film.directory)
-                .map_err(|error| format!("--frames {}: {error}", film.directory.display()))?;
-        }
+        let claimed = wanted.film.as_ref().map(|film| film_files::claim(&film.directory)).transpose()?;
         let look = wanted.clone();
+        let files = wanted.film.as_ref().map(FilmFiles::of);
+        let own = files.clone();
         let draw = move |work: Receiver<Work>, steps: &Progress, written: &AtomicU64| {
-            draw_all(stage, &look, &work, steps, written)
+            draw_all(stage, &look, own.as_ref(), &work, (steps, written))
         };
-        Self::drawn_by(draw, wanted, moments, period_ns, (waits, STUCK))
+        let snapshots = Self::drawn_by(draw, wanted, moments, period_ns, (waits, STUCK))?;
+        Ok(Self { files, claim: claimed.flatten(), ..snapshots })
     }
 
     /// The same with somebody else who draws.
@@ -157,6 +166,8 @@ impl Snapshots {
         Ok(Self {
             shots,
             film: wanted.film.clone(),
+            files: None,
+            claim: None,
             due: 0,
             left_out: 0,
             waits,
@@ -184,13 +195,13 @@ impl Snapshots {
             self.asked += 1;
             self.keep(Work::Picture(Box::new(moment), shot.file));
         }
-        if let Some(Film { directory, fps }) = &self.film
+        if let Some(Film { fps, .. }) = &self.film
             && self.due as f64 / fps < now_s
         {
-            let file = directory.join(format!("frame-{:06}.png", self.due));
+            let number = self.due;
             self.due += 1;
             let moment = self.moments.moment(row, bodies, placed);
-            self.give_to_film(Work::Frame(Box::new(moment), file));
+            self.give_to_film(Work::Frame(Box::new(moment), number));
         }
     }
 
@@ -266,10 +277,19 @@ impl Snapshots {
         }
         drop(self.out.take());
         let drawn = self.thread.take().map_or_else(Drawn::default, |thread| self.wait_for(thread));
+        let (mut older, mut strange) = (0, 0);
+        if let Some(files) = &self.files {
+            // A disk that stands still would hold up the end.
+            if self.given_up.is_none() {
+                files.settle(self.due);
+            }
+            (older, strange) = (files.older(), files.stuck());
+        }
+        drop(self.claim.take());
         let failure = self.given_up.or(drawn.failure);
         let missing = if failure.is_some() { self.asked.saturating_sub(drawn.written) } else { 0 };
-        let older = self.film.as_ref().map_or(0, |film| older_frames(film, self.due));
-        Drawn { left_out: self.left_out, not_reached: self.shots.len(), older, missing, failure, ..drawn }
+        let (left_out, not_reached) = (self.left_out, self.shots.len());
+        Drawn { left_out, not_reached, older, strange, missing, failure, ..drawn }
     }
 
     fn wait_for(&mut self, thread: JoinHandle<Drawn>) -> Drawn {
@@ -325,9 +345,9 @@ impl Drawer {
 fn draw_all(
     first: Stage,
     wanted: &Wanted,
+    film: Option<&FilmFiles>,
     work: &Receiver<Work>,
-    steps: &Progress,
-    written: &AtomicU64,
+    (steps, written): (&Progress, &AtomicU64),
 ) -> Drawn {
     let mut drawn = Drawn::default();
     let (mut next, mut drawer) = (Some(first), None);
@@ -349,15 +369,15 @@ fn draw_all(
                 }
             }
         }
-        let (moment, file) = match work.recv() {
+        let (moment, file, number) = match work.recv() {
             Ok(Work::Scene(stage)) => {
                 next = Some(*stage);
                 continue;
             }
-            Ok(Work::Picture(moment, file)) => (moment, file),
-            Ok(Work::Frame(moment, file)) => {
-                end_link(&file);
-                (moment, file)
+            Ok(Work::Picture(moment, file)) => (moment, file, None),
+            Ok(Work::Frame(moment, number)) => {
+                let Some(film) = film else { continue };
+                (moment, film.place(number), Some((film, number)))
             }
             Err(_) => return drawn,
         };
@@ -365,40 +385,28 @@ fn draw_all(
         drawn.renderer = studio.renderer().to_owned();
         let picture = studio.take(&moment, camera, eyes);
         steps.take();
-        drawn.note(&file, picture.save(&file));
+        if drawn.note(&file, picture.save(&file))
+            && let Some((film, number)) = number
+        {
+            film.written(number);
+        }
         written.store(drawn.written, Ordering::Relaxed);
         steps.take();
     }
 }
 
-/// A name of a picture that is a link, or one of several names of a file, is that no more: a film has files of its own, and what
-/// it led to may be what is drawn.
-fn end_link(file: &Path) {
-    let Ok(found) = std::fs::symlink_metadata(file) else { return };
-    if found.is_symlink() || found.is_file() && found.nlink() > 1 {
-        // Whoever may not do that is told when the picture cannot be written.
-        let _ = std::fs::remove_file(file);
-    }
-}
-
-/// Pictures of an earlier film that lie behind those of this one.
-fn older_frames(film: &Film, due: u64) -> usize {
-    let Ok(entries) = std::fs::read_dir(&film.directory) else { return 0 };
-    let number =
-        |name: &OsStr| name.to_str()?.strip_prefix("frame-")?.strip_suffix(".png")?.parse::<u64>().ok();
-    entries.flatten().filter(|entry| number(&entry.file_name()).is_some_and(|number| number >= due)).count()
-}
-
 impl Drawn {
-    fn note(&mut self, file: &Path, saved: std::io::Result<()>) {
+    /// Whether it is written.
+    fn note(&mut self, file: &Path, saved: std::io::Result<()>) -> bool {
         let Err(error) = saved else {
             self.written += 1;
-            return;
+            return true;
         };
         if self.failure.is_none() {
             say(format_args!("phantom3: the picture {} cannot be written: {error}", file.display()));
         }
         self.failure = Some(error.to_string());
+        false
     }
 }
 

@@ -24,6 +24,14 @@
  *
  * The same rules as in Rust: a value is whole or it is not returned; what the driver wrote is checked before
  * it is believed; the lease lasts as long as the connection is open, and one thread publishes.
+ *
+ * Signal handlers may call phantom_send_stop, which never waits, and phantom_emergency_stop, phantom_stop,
+ * phantom_clear_fault, phantom_zero and phantom_end_lease, which wait for an answer for up to seven seconds. These call
+ * nothing but what POSIX calls async-signal-safe: no allocation, no lock, no printf. They need less than 4 KiB of stack
+ * and leave errno as it is. Of the others phantom_latest_tick, phantom_read_frame and phantom_is_attached may be called there;
+ * phantom_attach, phantom_detach, phantom_publish and phantom_sleep_for_frame may not.
+ *
+ * A path is never empty: every function that takes one fails then.
  */
 #ifndef PHANTOM3_CLIENT_H
 #define PHANTOM3_CLIENT_H
@@ -39,6 +47,7 @@
 #include <limits.h>
 #include <linux/futex.h>
 #include <poll.h>
+#include <stdarg.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -57,6 +66,10 @@
 #define PHANTOM_NO_TICK UINT64_MAX
 /* A driver that does not answer within this time is stopped or hung [s]. */
 #define PHANTOM_ANSWER_TIMEOUT_S 2
+/* How many symbolic links a path may lead through; the kernel's own bound. */
+#define PHANTOM_MAX_LINKS 40
+/* Room for what a symbolic link leads to. More than a socket's address has: the next link may lead to a short name. */
+#define PHANTOM_PATH_BYTES 1024
 
 /* What an application holds of the driver. */
 typedef struct PhantomAttachment {
@@ -257,78 +270,156 @@ static inline void *phantom_map(int fd, size_t bytes, int protection, char *erro
     return NULL;
 }
 
+/* Appends a character, as long as there is room. */
+static inline void phantom_put(char *text, size_t *used, char character) {
+    if (*used + 1 < PHANTOM_ERROR_BYTES) text[(*used)++] = character;
+}
+
+/* Appends a number of at least so many digits. */
+static inline void phantom_put_number(char *text, size_t *used, uint64_t number, unsigned base, unsigned least) {
+    char digits[20];
+    unsigned count = 0;
+    do {
+        digits[count++] = "0123456789abcdef"[number % base];
+        number /= base;
+    } while (number != 0 || count < least);
+    while (count > 0) phantom_put(text, used, digits[--count]);
+}
+
+/* snprintf for signal handlers: PHANTOM_ERROR_BYTES at most, and of the conversions %s, %llu and %016llx only. */
+__attribute__((format(printf, 2, 3)))
+static inline void phantom_say(char *error, const char *format, ...) {
+    size_t used = 0;
+    va_list values;
+    va_start(values, format);
+    for (; *format; format++) {
+        if (*format != '%') {
+            phantom_put(error, &used, *format);
+        } else if (*++format == 's') {
+            for (const char *text = va_arg(values, const char *); *text; text++) phantom_put(error, &used, *text);
+        } else {
+            int is_hexadecimal = *format == '0';
+            phantom_put_number(error, &used, va_arg(values, unsigned long long), is_hexadecimal ? 16 : 10,
+                               is_hexadecimal ? 16 : 1);
+            while (*format != 'u' && *format != 'x') format++;
+        }
+    }
+    va_end(values);
+    error[used] = 0;
+}
+
+/* The system's words for what keeps a program from a driver; NULL for what is not to be expected. strerror is not for
+ * signal handlers. */
+static inline const char *phantom_reason(int number) {
+    switch (number) {
+    case EACCES: return "Permission denied";
+    case EAGAIN: return "Resource temporarily unavailable";
+    case ECONNREFUSED: return "Connection refused";
+    case EINTR: return "Interrupted system call";
+    case ELOOP: return "Too many levels of symbolic links";
+    case EMFILE: return "Too many open files";
+    case ENAMETOOLONG: return "File name too long";
+    case ENFILE: return "Too many open files in system";
+    case ENOENT: return "No such file or directory";
+    case ENOTDIR: return "Not a directory";
+    case EPERM: return "Operation not permitted";
+    case EPROTOTYPE: return "Protocol wrong type for socket";
+    default: return NULL;
+    }
+}
+
 /* Whether the answer grants what was asked for; else `error` says what was found and what to do. */
 static inline int phantom_is_granted(const PhantomRequest *request, const PhantomAnswer *answer, char *error) {
-    uint64_t found = answer->abi_version, own = request->abi_version;
+    const unsigned long long found = answer->abi_version, own = request->abi_version, kind = request->kind;
+    const unsigned long long minor = UINT64_C(0xffffffff), user = geteuid();
     if (answer->magic != PHANTOM_MAGIC) {
-        snprintf(error, PHANTOM_ERROR_BYTES, "this is not a driver's socket: it answered with magic 0x%016llx",
-                 (unsigned long long)answer->magic);
+        phantom_say(error, "this is not a driver's socket: it answered with magic 0x%016llx",
+                    (unsigned long long)answer->magic);
     } else if (found >> 32 != own >> 32) {
-        snprintf(error, PHANTOM_ERROR_BYTES,
-                 "the driver speaks ABI version %u.%u, this program %u.%u; install both from the same release",
-                 (unsigned)(found >> 32), (unsigned)found, (unsigned)(own >> 32), (unsigned)own);
+        phantom_say(error,
+                    "the driver speaks ABI version %llu.%llu, this program %llu.%llu; install both from the same release",
+                    found >> 32, found & minor, own >> 32, own & minor);
     } else if (answer->layout_hash != request->layout_hash) {
-        snprintf(error, PHANTOM_ERROR_BYTES,
-                 "the driver's memory layout is 0x%016llx, this program's 0x%016llx; rebuild both from the same source",
-                 (unsigned long long)answer->layout_hash, (unsigned long long)request->layout_hash);
+        phantom_say(error,
+                    "the driver's memory layout is 0x%016llx, this program's 0x%016llx; rebuild both from the same source",
+                    (unsigned long long)answer->layout_hash, (unsigned long long)request->layout_hash);
     } else if (answer->verdict == PHANTOM_VERDICT_LEASE_HELD) {
-        char holder[40] = "a process of another PID namespace";
-        if (answer->holder_pid) snprintf(holder, sizeof holder, "process %llu", (unsigned long long)answer->holder_pid);
-        snprintf(error, PHANTOM_ERROR_BYTES,
-                 "the devices are commanded by %s (%.*s) already; end it first, or attach as an observer", holder,
-                 PHANTOM_NAME_BYTES, (const char *)answer->holder_name);
+        char name[PHANTOM_NAME_BYTES + 1] = {0};
+        memcpy(name, answer->holder_name, PHANTOM_NAME_BYTES);
+        if (answer->holder_pid)
+            phantom_say(error,
+                        "the devices are commanded by process %llu (%s) already; end it first, or attach as an observer",
+                        (unsigned long long)answer->holder_pid, name);
+        else
+            phantom_say(error,
+                        "the devices are commanded by a process of another PID namespace (%s) already; end it first, or "
+                        "attach as an observer",
+                        name);
     } else if (answer->verdict == PHANTOM_VERDICT_NOT_ALLOWED && answer->allowed_group_plus_one) {
-        snprintf(error, PHANTOM_ERROR_BYTES,
-                 "the driver does not let user %u ask for this (kind %llu): members of group %llu may",
-                 (unsigned)geteuid(), (unsigned long long)request->kind,
-                 (unsigned long long)(answer->allowed_group_plus_one - 1));
+        phantom_say(error, "the driver does not let user %llu ask for this (kind %llu): members of group %llu may", user,
+                    kind, (unsigned long long)(answer->allowed_group_plus_one - 1));
     } else if (answer->verdict == PHANTOM_VERDICT_NOT_ALLOWED) {
-        snprintf(error, PHANTOM_ERROR_BYTES,
-                 "the driver does not let user %u ask for this (kind %llu): root and the user that it runs as may",
-                 (unsigned)geteuid(), (unsigned long long)request->kind);
+        phantom_say(error,
+                    "the driver does not let user %llu ask for this (kind %llu): root and the user that it runs as may",
+                    user, kind);
     } else if (answer->verdict == PHANTOM_VERDICT_OUTDATED) {
-        snprintf(error, PHANTOM_ERROR_BYTES,
-                 "the driver heard this too late: an emergency stop came after it was asked, or more than a second "
-                 "went by; look how things stand, then ask again");
+        phantom_say(error,
+                    "the driver heard this too late: an emergency stop came after it was asked, or more than a second "
+                    "went by; look how things stand, then ask again");
     } else if (answer->verdict == PHANTOM_VERDICT_LEASE_ENDED) {
-        snprintf(error, PHANTOM_ERROR_BYTES,
-                 "an administrator of the driver has ended the lease of user %u; others come first for ten seconds",
-                 (unsigned)geteuid());
+        phantom_say(error,
+                    "an administrator of the driver has ended the lease of user %llu; others come first for ten seconds",
+                    user);
     } else if (answer->verdict == PHANTOM_VERDICT_UNKNOWN_KIND) {
-        snprintf(error, PHANTOM_ERROR_BYTES,
-                 "the driver speaks version %u.%u and does not know requests of kind %llu, this program speaks %u.%u; "
-                 "start the driver that belongs to this program",
-                 (unsigned)(found >> 32), (unsigned)found, (unsigned long long)request->kind, (unsigned)(own >> 32),
-                 (unsigned)own);
+        phantom_say(error,
+                    "the driver speaks version %llu.%llu and does not know requests of kind %llu, this program speaks "
+                    "%llu.%llu; start the driver that belongs to this program",
+                    found >> 32, found & minor, kind, own >> 32, own & minor);
     } else if (answer->verdict != PHANTOM_VERDICT_GRANTED) {
-        snprintf(error, PHANTOM_ERROR_BYTES, "the driver refused with verdict %llu (see PhantomVerdict)",
-                 (unsigned long long)answer->verdict);
+        phantom_say(error, "the driver refused with verdict %llu (see PhantomVerdict)",
+                    (unsigned long long)answer->verdict);
     } else {
         return 1;
     }
     return 0;
 }
 
+/* Address of a name with `suffix` behind it. Its length; 0: the name is empty or too long. An empty one would be the
+ * abstract address of whoever has taken that. */
+static inline socklen_t phantom_address(const char *path, const char *suffix, struct sockaddr_un *address) {
+    size_t length = strlen(path), more = strlen(suffix);
+    memset(address, 0, sizeof *address);
+    address->sun_family = AF_UNIX;
+    if (length == 0 || length + more >= sizeof address->sun_path) return 0;
+    memcpy(address->sun_path, path, length);
+    memcpy(address->sun_path + length, suffix, more);
+    return (socklen_t)(offsetof(struct sockaddr_un, sun_path) + length + more + 1);
+}
+
 /* Connects to a driver's socket. -1: see `error`. */
 static inline int phantom_connect(const char *path, char *error) {
     struct sockaddr_un address;
     struct timeval timeout = {PHANTOM_ANSWER_TIMEOUT_S, 0};
-    memset(&address, 0, sizeof address);
-    address.sun_family = AF_UNIX;
-    if (strlen(path) >= sizeof address.sun_path) {
-        snprintf(error, PHANTOM_ERROR_BYTES, "the socket's name is longer than %zu bytes; choose a shorter one",
-                 sizeof address.sun_path - 1);
+    socklen_t length = phantom_address(path, "", &address);
+    if (length == 0) {
+        if (*path == 0) phantom_say(error, "the path of the driver's socket is empty; name the socket");
+        else
+            phantom_say(error, "the socket's name is longer than %llu bytes; choose a shorter one",
+                        (unsigned long long)(sizeof address.sun_path - 1));
         return -1;
     }
-    memcpy(address.sun_path, path, strlen(path));
     int connection = socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0);
     if (connection >= 0) {
         setsockopt(connection, SOL_SOCKET, SO_RCVTIMEO, &timeout, sizeof timeout);
         setsockopt(connection, SOL_SOCKET, SO_SNDTIMEO, &timeout, sizeof timeout);
-        if (!connect(connection, (const struct sockaddr *)&address, sizeof address)) return connection;
+        if (!connect(connection, (const struct sockaddr *)&address, length)) return connection;
     }
-    snprintf(error, PHANTOM_ERROR_BYTES, "cannot reach a driver at %.200s: %s; is one running?", path,
-             strerror(errno));
+    int number = errno;
+    const char *reason = phantom_reason(number);
+    if (reason) phantom_say(error, "cannot reach a driver at %s: %s; is one running?", path, reason);
+    else
+        phantom_say(error, "cannot reach a driver at %s: error %llu of the system; is one running?", path,
+                    (unsigned long long)number);
     if (connection >= 0) close(connection);
     return -1;
 }
@@ -359,8 +450,7 @@ static inline int phantom_exchange(const char *path, const PhantomRequest *reque
     /* A driver without room for us answers unasked and hangs up, so that a failed send is no reason to stop. */
     (void)!send(connection, request, sizeof *request, MSG_NOSIGNAL);
     if (phantom_receive(connection, answer, fds) < sizeof *answer) {
-        snprintf(error, PHANTOM_ERROR_BYTES, "the driver at %.200s gives no answer; it may be stopped, or no driver",
-                 path);
+        phantom_say(error, "the driver at %s gives no answer; it may be stopped, or no driver", path);
     } else {
         phantom_number_as_here(connection, answer);
         if (phantom_is_granted(request, answer, error)) return connection;
@@ -472,11 +562,14 @@ static inline int phantom_attach(const char *path, uint64_t kind, const char *na
 static inline int phantom_ask(const char *path, const PhantomRequest *request, char *error) {
     PhantomAnswer answer;
     int fds[2];
+    const int errno_before = errno;
     int connection = phantom_exchange(path, request, &answer, fds, error);
-    if (connection < 0) return -1;
-    phantom_close(fds);
-    close(connection);
-    return 0;
+    if (connection >= 0) {
+        phantom_close(fds);
+        close(connection);
+    }
+    errno = errno_before;
+    return connection < 0 ? -1 : 0;
 }
 
 /* Asks the driver to end: it writes zero to the motors and leaves. As phantom_ask. */
@@ -504,43 +597,91 @@ static inline int phantom_end_lease(const char *path, const char *name, char *er
     return phantom_ask(path, &request, error);
 }
 
-/* Sends a datagram to the stop socket beside `path`. 0: it is on its way; 1: the queue is full; -1: nobody is there. */
-static inline int phantom_send_stop_beside(const char *path) {
-    static const char suffix[] = ".stop";
-    struct sockaddr_un address;
-    size_t length = strlen(path);
-    memset(&address, 0, sizeof address);
-    address.sun_family = AF_UNIX;
-    if (length + sizeof suffix > sizeof address.sun_path) return -1;
-    memcpy(address.sun_path, path, length);
-    memcpy(address.sun_path + length, suffix, sizeof suffix);
+/* Sends a datagram to an address. 0: it is on its way; 1: the queue is full; -1: nobody is there. */
+static inline int phantom_send_stop_to(const struct sockaddr_un *address, socklen_t length) {
     int sender = socket(AF_UNIX, SOCK_DGRAM | SOCK_CLOEXEC, 0);
     if (sender < 0) return -1;
-    ssize_t sent = sendto(sender, "stop", 4, MSG_DONTWAIT | MSG_NOSIGNAL, (const struct sockaddr *)&address,
-                          sizeof address);
+    ssize_t sent = sendto(sender, "stop", 4, MSG_DONTWAIT | MSG_NOSIGNAL, (const struct sockaddr *)address, length);
     int is_full = sent < 0 && (errno == EAGAIN || errno == EWOULDBLOCK);
     close(sender);
     return sent >= 0 ? 0 : is_full ? 1 : -1;
 }
 
-/* Sends a datagram to the driver's stop socket, which lies beside its own: whatever comes there stops the motors, and
- * no connection is needed for it. Where `path` is a link, also to what lies beside its target, which counts for more. Never
- * waits. 0: it is on its way; 1: the queue is full of stops, perhaps of others only; -1: nobody is there. */
-static inline int phantom_send_stop(const char *path) {
-    int sent = phantom_send_stop_beside(path);
-    char *target = realpath(path, NULL);
-    if (target != NULL && strcmp(target, path)) {
-        int beside_target = phantom_send_stop_beside(target);
-        if (beside_target >= 0) sent = beside_target;
+/* Where the last component of a path begins. */
+static inline size_t phantom_directory_bytes(const char *path) {
+    const char *slash = strrchr(path, '/');
+    return slash ? (size_t)(slash - path) + 1 : 0;
+}
+
+/* Sends a datagram to the stop socket beside a path that no address has room for, by way of its directory. `path` is
+ * changed meanwhile. As phantom_send_stop_to. */
+static inline int phantom_send_stop_beside_far(char *path) {
+    struct sockaddr_un address;
+    char place[sizeof address.sun_path] = "/proc/self/fd/";
+    size_t used = strlen(place), bytes = phantom_directory_bytes(path), length = strlen(path + bytes);
+    if (bytes == 0) return -1;
+    path[bytes - 1] = 0;
+    int directory = open(bytes > 1 ? path : "/", O_PATH | O_DIRECTORY | O_CLOEXEC);
+    path[bytes - 1] = '/';
+    if (directory < 0) return -1;
+    phantom_put_number(place, &used, (uint64_t)directory, 10, 1);
+    place[used++] = '/';
+    int sent = -1;
+    if (used + length < sizeof place) {
+        memcpy(place + used, path + bytes, length + 1);
+        socklen_t address_length = phantom_address(place, ".stop", &address);
+        if (address_length > 0) sent = phantom_send_stop_to(&address, address_length);
     }
-    free(target);
+    close(directory);
     return sent;
+}
+
+/* Replaces a path by what the symbolic link of that name leads to. 0: it is none, or leads to more than there is room for.
+ * Links of directories may stay: what lies beside a socket is found through them. */
+static inline int phantom_follow(char path[PHANTOM_PATH_BYTES]) {
+    char target[PHANTOM_PATH_BYTES];
+    ssize_t length = readlink(path, target, sizeof target);
+    if (length <= 0) return 0;
+    size_t kept = target[0] == '/' ? 0 : phantom_directory_bytes(path);
+    if (kept + (size_t)length >= PHANTOM_PATH_BYTES) return 0;
+    memcpy(path + kept, target, (size_t)length);
+    path[kept + (size_t)length] = 0;
+    return 1;
+}
+
+/* Sends a datagram to the stop socket beside what the symbolic link `link` leads to. As phantom_send_stop_to; -1 also if it
+ * is no link. */
+static inline int phantom_send_stop_through(const char *link) {
+    struct sockaddr_un address;
+    char path[PHANTOM_PATH_BYTES];
+    int links = 0;
+    if (strlen(link) >= sizeof path) return -1;
+    memcpy(path, link, strlen(link) + 1);
+    while (links < PHANTOM_MAX_LINKS && phantom_follow(path)) links++;
+    if (links == 0) return -1;
+    socklen_t length = phantom_address(path, ".stop", &address);
+    return length > 0 ? phantom_send_stop_to(&address, length) : phantom_send_stop_beside_far(path);
+}
+
+/* Sends a datagram to the driver's stop socket, which lies beside its own: whatever comes there stops the motors, and
+ * no connection is needed for it. Where `path` is a link, then also to what lies beside its target, which counts for more.
+ * Never waits; for signal handlers, too. 0: it is on its way; 1: the queue is full of stops, perhaps of others only; -1:
+ * nobody is there, or the path is empty. */
+static inline int phantom_send_stop(const char *path) {
+    struct sockaddr_un address;
+    const int errno_before = errno;
+    socklen_t length = phantom_address(path, ".stop", &address);
+    int sent = length > 0 ? phantom_send_stop_to(&address, length) : -1;
+    int sent_through = phantom_send_stop_through(path);
+    errno = errno_before;
+    return sent_through >= 0 ? sent_through : sent;
 }
 
 /* Asks the driver to switch all motors off at once; they stay off until phantom_clear_fault. By datagram, which a driver
  * hears whose service is stuck and which is sent before anything waits, and over a connection, by which the driver knows
- * whose stop it is. 0: the driver has heard it, or the datagram is on its way to whoever listens beside its socket; a
- * frame of state PHANTOM_DRIVER_STATE_FAULT tells that it is done. -1: see `error`. */
+ * whose stop it is. For signal handlers, too. 0: the driver has heard it, or the datagram is on its way to whoever listens
+ * beside its socket, who may be about to end and do nothing about it; a frame of state PHANTOM_DRIVER_STATE_FAULT tells
+ * that it is done. -1: see `error`. */
 static inline int phantom_emergency_stop(const char *path, const char *name, char *error) {
     int sent = phantom_send_stop(path);
     PhantomRequest request = phantom_request(PHANTOM_REQUEST_KIND_EMERGENCY_STOP, name);

@@ -5,6 +5,7 @@
  *     c_client SOCKET version     claims to be of ABI version 99.7
  *     c_client SOCKET attach N    attaches with a request of kind N
  *     c_client SOCKET ask WHAT    stop, emergency-stop, clear-fault, zero (devices 0 and 2) or end-lease
+ *     c_client SOCKET send-stop   only by datagram; prints what came of it
  */
 #include "phantom3_client.h"
 
@@ -55,17 +56,26 @@ static void answer(const PhantomAttachment *driver, const PhantomFrame *frame) {
 static int ask(const char *socket, const char *what) {
     char error[PHANTOM_ERROR_BYTES] = "no such request";
     int failed = -1;
+    errno = ERANGE;
     if (!strcmp(what, "stop")) failed = phantom_stop(socket, "c_client", error);
     if (!strcmp(what, "emergency-stop")) failed = phantom_emergency_stop(socket, "c_client", error);
     if (!strcmp(what, "clear-fault")) failed = phantom_clear_fault(socket, "c_client", error);
     if (!strcmp(what, "zero")) failed = phantom_zero(socket, "c_client", 5, error);
     if (!strcmp(what, "end-lease")) failed = phantom_end_lease(socket, "c_client", error);
+    if (errno != ERANGE) return 3;
     if (failed) fprintf(stderr, "%s\n", error);
     return failed ? 1 : 0;
 }
 
+static int send_stop(const char *socket) {
+    errno = ERANGE;
+    printf("%d\n", phantom_send_stop(socket));
+    return errno == ERANGE ? 0 : 3;
+}
+
 int main(int argc, char **argv) {
     if (argc < 3) return 2;
+    if (!strcmp(argv[2], "send-stop")) return send_stop(argv[1]);
     if (argc > 3 && !strcmp(argv[2], "ask")) return ask(argv[1], argv[3]);
     int commands = !strcmp(argv[2], "command");
     PhantomRequest request =

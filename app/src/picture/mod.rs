@@ -51,7 +51,7 @@ pub struct PlotArgs {
     #[arg(long)]
     svg_only: bool,
     /// Where: OUT.svg and OUT.png, called as the recording in OUT/; with --by-entity a directory for ENTITY.svg and
-    /// ENTITY.png
+    /// ENTITY.png. What is there is replaced, and told; inputs are not
     /// [default: the recording's name without its ending; with --objects and -objects behind it]
     #[arg(long, value_name = "OUT")]
     out: Option<PathBuf>,
@@ -98,6 +98,10 @@ fn draw(
 ) -> Result<(), RunFailure> {
     let wrong = |error: &dyn std::fmt::Display| RunFailure::Start(error.to_string());
     let finger = |recorded: &Recorded| recorded.choose(args.finger.as_deref()).map_err(|error| wrong(&error));
+    let all: Vec<&Recorded> = [recorded].into_iter().chain(against).collect();
+    if !args.by_entity {
+        check_read(out, args.svg_only, &all)?;
+    }
     if args.objects {
         let others = against.map(|against| (against, &*against.bodies));
         let bodies = recorded.moving().map_err(|error| wrong(&error))?;
@@ -129,6 +133,7 @@ fn draw(
     let stems: Vec<PathBuf> = file_stems(&felt).into_iter().map(|stem| out.join(stem)).collect();
     let inputs: Vec<&PathBuf> = [&args.recording].into_iter().chain(&args.against).collect();
     stems.iter().try_for_each(|stem| check_files(stem, args.svg_only, &inputs))?;
+    stems.iter().try_for_each(|stem| check_read(stem, args.svg_only, &all))?;
     for (visit, stem) in felt.iter().zip(stems) {
         let other = felt_against.iter().find(|other| other.entity == visit.entity);
         let other = against.map(Recorded::label).zip(other);
@@ -186,10 +191,29 @@ fn with_end(path: &Path, end: &str) -> PathBuf {
     name.into()
 }
 
+/// The files of a picture.
+fn files_of(stem: &Path, svg_only: bool) -> Vec<PathBuf> {
+    let endings: &[&str] = if svg_only { &[".svg"] } else { &[".svg", ".png"] };
+    endings.iter().map(|ending| with_end(stem, ending)).collect()
+}
+
+/// No picture takes the place of one that the recorded run read, which is known by its content.
+fn check_read(stem: &Path, svg_only: bool, recorded: &[&Recorded]) -> Result<(), RunFailure> {
+    for file in files_of(stem, svg_only) {
+        if let Some(recording) = recorded.iter().find_map(|recorded| recorded.has_read(&file)) {
+            return Err(RunFailure::Start(format!(
+                "the picture {} would overwrite an input of the run that is recorded in {}; name another place with --out",
+                Plain(file.display()),
+                Plain(recording.display())
+            )));
+        }
+    }
+    Ok(())
+}
+
 /// No picture takes the place of a recording.
 fn check_files(stem: &Path, svg_only: bool, inputs: &[&PathBuf]) -> Result<(), RunFailure> {
-    let endings: &[&str] = if svg_only { &[".svg"] } else { &[".svg", ".png"] };
-    let files: Vec<PathBuf> = endings.iter().map(|ending| with_end(stem, ending)).collect();
+    let files = files_of(stem, svg_only);
     let outputs: Vec<_> = files.iter().map(|file| Output::chart(file)).collect();
     outputs::check(&outputs, inputs)
 }
@@ -207,6 +231,8 @@ fn check_place(stem: &Path) -> Result<(), RunFailure> {
 
 fn write(figure: &Figure, stem: &Path, svg_only: bool) -> Result<(), RunFailure> {
     let late = |error: PlotError| RunFailure::Results(error.to_string());
+    let is_earlier = |file: &PathBuf| file.metadata().is_ok_and(|found| found.is_file() && found.len() > 0);
+    let replaced: Vec<PathBuf> = files_of(stem, svg_only).into_iter().filter(is_earlier).collect();
     let written = if svg_only {
         figure.write_svg(stem).map_err(late)?;
         ".svg"
@@ -215,5 +241,8 @@ fn write(figure: &Figure, stem: &Path, svg_only: bool) -> Result<(), RunFailure>
         ".svg, .png"
     };
     tell(&format_args!("written      {}{written}", Plain(stem.display())), false);
+    for file in replaced {
+        tell(&format_args!("replaced     {}", Plain(file.display())), false);
+    }
     Ok(())
 }

@@ -20,6 +20,8 @@ pub(super) struct Recorded {
     pub(super) times_s: Vec<f64>,
     pub(super) fingers: Vec<RecordedFinger>,
     pub(super) bodies: Vec<RecordedBody>,
+    /// Contents of the pictures that the run read.
+    pictures: Vec<Vec<u8>>,
     /// Why nothing is read behind the last of these rows, if something is wrong there.
     damage: Option<Damage>,
 }
@@ -128,12 +130,23 @@ impl Recorded {
                 }
             }
         }
-        Ok(Self { file: file.into(), times_s, fingers, bodies, damage })
+        let pictures = table.pictures();
+        Ok(Self { file: file.into(), times_s, fingers, bodies, pictures, damage })
     }
 
     /// The fault that damage behind its rows is.
     pub(super) fn damage(&self) -> Option<RunFailure> {
         self.damage.as_ref().map(|found| damaged(&found.why, found.rows, found.until_s))
+    }
+
+    /// The recording, if this file is a picture that its run read.
+    pub(super) fn has_read(&self, file: &Path) -> Option<&Path> {
+        let is_it = |content: &[u8]| {
+            let is_as_long =
+                file.metadata().is_ok_and(|found| found.is_file() && found.len() == content.len() as u64);
+            is_as_long && std::fs::read(file).is_ok_and(|found| found == content)
+        };
+        self.pictures.iter().any(|content| is_it(content)).then_some(&self.file)
     }
 
     /// What a legend calls it: the file's name without folders and ending.
@@ -164,7 +177,7 @@ impl Recorded {
         };
         let bodies = self.bodies.iter().map(body).collect();
         let times_s = kept(&self.times_s, &is_kept);
-        Ok(Self { times_s, fingers, bodies, file: self.file, damage: self.damage })
+        Ok(Self { times_s, fingers, bodies, ..self })
     }
 
     /// The entities that move.

@@ -1,6 +1,7 @@
 //! Which files a run is recorded in: those that were asked for, and beside each one of its own for every other scene.
 
 use super::destination::{Stream, is_same_place, is_standard_output, shown};
+use super::opened::HALF_REPLACED;
 use super::{
     About, Backpressure, Beginning, Opened, RecordFile, Recorder, View, begin_all, create, create_events,
     create_under_way,
@@ -10,6 +11,9 @@ use crate::recording::RecordingError;
 use crate::rig::Rig;
 use io_driver::device::Extras;
 use io_driver::say::say;
+use std::fs::File;
+use std::io::Read;
+use std::os::unix::fs::MetadataExt;
 use std::path::{Path, PathBuf};
 
 /// What recordings of a run have in common.
@@ -119,17 +123,38 @@ impl Files {
     }
 }
 
-/// For the second scene `out.2.mcap`, for the next `out.3.mcap`; or the first number behind it that is not taken.
+/// For the second scene `out.2.mcap`, for the next `out.3.mcap`; or the first number behind it that is not taken, and that only a
+/// recording has by that one name: nobody has named the file.
 fn free_place(first: &Path, scene: u32, taken: &[&PathBuf]) -> PathBuf {
     let mut number = scene + 1;
     loop {
         let place = numbered(first, number);
-        if !taken.iter().any(|other| is_same_place(&place, other)) && Stream::that_is(&place).is_none() {
+        let is_taken = taken.iter().any(|other| is_same_place(&place, other));
+        if !is_taken && Stream::that_is(&place).is_none() && !is_of_others(&place) {
             return place;
         }
         number += 1;
     }
 }
+
+/// A link, a file of several names, or one that begins as no recording does.
+fn is_of_others(place: &Path) -> bool {
+    let Ok(found) = place.symlink_metadata() else { return false };
+    found.is_symlink() || found.is_file() && (found.nlink() > 1 || !begins_as_recording(place, found.len()))
+}
+
+/// As a table or MCAP, an earlier one that was being replaced when a process was killed, or a file that was made and not begun.
+/// One that cannot be read tells nothing.
+fn begins_as_recording(file: &Path, bytes: u64) -> bool {
+    let mut first = Vec::new();
+    let read = File::open(file).and_then(|file| file.take(MCAP.len() as u64).read_to_end(&mut first));
+    let is_known = first.starts_with(TABLE) || first == MCAP || first.first() == Some(&HALF_REPLACED);
+    bytes == 0 || read.is_ok() && is_known
+}
+
+/// A table's first column, and the first bytes of MCAP.
+const TABLE: &[u8] = b"t,";
+const MCAP: &[u8] = b"\x89MCAP0\r\n";
 
 fn numbered(path: &Path, number: u32) -> PathBuf {
     match path.extension() {
@@ -154,5 +179,22 @@ mod tests {
         let taken = ["./w.2.csv", "w.3.csv"].map(PathBuf::from);
         let place = free_place(Path::new("w.csv"), 1, &taken.iter().collect::<Vec<_>>());
         assert_eq!(place, Path::new("w.4.csv"));
+    }
+
+    #[test]
+    fn only_an_earlier_recording_that_has_no_other_name_is_written_over() {
+        let directory = tempfile::tempdir().expect("a directory");
+        let file = |name: &str| directory.path().join(name);
+        let first = file("w.csv");
+        std::fs::write(file("precious.csv"), "t,f0\n0,1\n").expect("room");
+        std::os::unix::fs::symlink(file("precious.csv"), file("w.2.csv")).expect("a link");
+        std::fs::hard_link(file("precious.csv"), file("w.3.csv")).expect("a link");
+        std::os::unix::fs::symlink(file("nowhere"), file("w.4.csv")).expect("a link");
+        std::fs::write(file("w.5.csv"), "trial,answer\n1,yes\n").expect("room");
+        assert_eq!(free_place(&first, 1, &[]), file("w.6.csv"));
+        for recording in [&b"t,f0\n0,1\n"[..], b"\x89MCAP0\r\nrest", b"\0half", b""] {
+            std::fs::write(file("w.6.csv"), recording).expect("room");
+            assert_eq!(free_place(&first, 1, &[]), file("w.6.csv"), "a rerun writes the same files again");
+        }
     }
 }

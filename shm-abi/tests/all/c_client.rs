@@ -3,8 +3,8 @@
 use crate::common::fake::{fake_server, hear, send};
 use crate::common::{frame, info, wait_until};
 use bytemuck::Zeroable;
-use patience::limit;
 use patience::prelude::*;
+use patience::{limit, watched};
 use shm_abi::handshake::{Answer, Verdict};
 use shm_abi::server::{Server, ServerEvent};
 use shm_abi::stop_socket::Sent;
@@ -92,7 +92,9 @@ impl Driver {
     }
 
     fn poll(&mut self) {
-        self.server.poll(&self.memory, Duration::from_millis(1), &mut self.events).unwrap();
+        let Self { memory, server, events, .. } = self;
+        watched(limit(), "a turn of the server", || server.poll(memory, Duration::from_millis(1), events))
+            .unwrap();
     }
 
     fn serve_until_it_ends(&mut self, mut client: Child) -> Output {
@@ -247,6 +249,88 @@ fn a_c_program_stops_a_driver_through_a_link_whoever_listens_beside_that() {
     assert!(output.status.success() && is_stopped(&driver.events), "{output:?}: {:?}", driver.events);
     assert!(stops.recv(&mut [0; 16]).is_ok(), "nothing came");
     assert!(stranger.recv(&mut [0; 16]).is_ok(), "it may be the driver's as well");
+}
+
+/// Links to a driver's socket in `directory/a`, by names in `directory`.
+fn links_to_a_driver(directory: &Path) -> Vec<PathBuf> {
+    let deep = "deep/".repeat(30);
+    std::fs::create_dir_all(directory.join(&deep)).unwrap();
+    std::fs::create_dir(directory.join("b")).unwrap();
+    let links = [
+        ("absolute", directory.join("a/driver.sock").into_os_string()),
+        ("relative", "a/driver.sock".into()),
+        ("b/upwards", "../a/driver.sock".into()),
+        ("chain", "b/upwards".into()),
+        ("directory", "a".into()),
+        ("through", "directory/driver.sock".into()),
+        // Its own directory is reached by another name, and `..` is that of the directory itself.
+        ("other", format!("{deep}x").into()),
+        (&*format!("{deep}x"), "../".repeat(30).into()),
+        (&*format!("{deep}long"), format!("{}a/driver.sock", "../".repeat(30)).into()),
+        ("to-long", format!("{deep}long").into()),
+    ];
+    for (link, target) in &links {
+        std::os::unix::fs::symlink(target, directory.join(link)).unwrap();
+    }
+    ["absolute", "relative", "b/upwards", "chain", "through", "other/relative", "to-long"]
+        .map(|link| directory.join(link))
+        .into()
+}
+
+#[test]
+fn a_stop_of_a_c_program_goes_through_every_kind_of_link() {
+    let Some(program) = compiled() else { return };
+    let directory = tempfile::tempdir().unwrap();
+    std::fs::create_dir(directory.path().join("a")).unwrap();
+    let stops = stops_beside(&directory.path().join("a/driver.sock"));
+    let send = |place: &Path| {
+        let mut client = std::process::Command::new(program);
+        let output =
+            client.current_dir(directory.path()).arg(place).arg("send-stop").bounded_output().unwrap();
+        assert!(output.status.success(), "{}: {output:?}", place.display());
+        (String::from_utf8(output.stdout).unwrap(), stops.recv(&mut [0; 16]).is_ok())
+    };
+    let links = links_to_a_driver(directory.path());
+    for place in links.iter().map(PathBuf::as_path).chain([Path::new("chain"), Path::new("b/upwards")]) {
+        assert_eq!(send(place), ("0\n".into(), true), "{}", place.display());
+    }
+    // Neither these nor a link that leads to itself hold it up.
+    std::os::unix::fs::symlink("round", directory.path().join("round")).unwrap();
+    std::os::unix::fs::symlink("nowhere", directory.path().join("dangling")).unwrap();
+    for place in ["round", "dangling", "nobody", "b", "b/", "/"] {
+        assert_eq!(send(Path::new(place)), ("-1\n".into(), false), "{place}");
+    }
+}
+
+/// An address of all the room there is, empty, is an abstract one, and `.stop` a file of whoever owns the directory.
+#[test]
+fn a_c_program_that_names_no_socket_asks_nobody() {
+    use std::os::linux::net::SocketAddrExt;
+    use std::os::unix::net::{SocketAddr, UnixListener};
+    let Some(program) = compiled() else { return };
+    let directory = tempfile::tempdir().unwrap();
+    let stops = stops_beside(&directory.path().join(""));
+    let stranger = SocketAddr::from_abstract_name([0; 107])
+        .and_then(|address| UnixListener::bind_addr(&address))
+        .unwrap();
+    stranger.set_nonblocking(true).unwrap();
+    let run = |arguments: &[&str]| {
+        let mut client = std::process::Command::new(program);
+        client.current_dir(directory.path()).arg("").args(arguments).bounded_output().unwrap()
+    };
+    let asking = ["stop", "emergency-stop", "clear-fault", "zero", "end-lease"].map(|what| vec!["ask", what]);
+    for arguments in asking.iter().map(Vec::as_slice).chain([&["observe", "1"][..], &["command", "1"]]) {
+        let output = run(arguments);
+        assert_eq!(
+            (output.status.code(), String::from_utf8_lossy(&output.stderr).as_ref()),
+            (Some(1), "the path of the driver's socket is empty; name the socket\n"),
+            "{arguments:?}"
+        );
+    }
+    assert_eq!(String::from_utf8(run(&["send-stop"]).stdout).unwrap(), "-1\n");
+    let met = stranger.accept().map(drop).map_err(|error| error.kind());
+    assert_eq!(met, Err(std::io::ErrorKind::WouldBlock), "a stranger was asked");
+    assert!(stops.recv(&mut [0; 16]).is_err(), "whoever listens at .stop was asked");
 }
 
 #[test]

@@ -16,6 +16,7 @@ mod minor_versions;
 mod other_processes;
 mod refusals;
 mod sealed_memory;
+mod signal_handlers;
 mod socket_places;
 mod stop_datagram;
 mod turns;

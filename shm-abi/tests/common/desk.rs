@@ -3,7 +3,7 @@
 use super::fake::receive;
 use super::{directory, info, wait_until};
 use bytemuck::Zeroable;
-use patience::limit;
+use patience::{limit, watched};
 use shm_abi::handshake::{Answer, Request, RequestKind, Verdict};
 use shm_abi::server::{Server, ServerEvent};
 use shm_abi::{CommanderMemory, DriverMemory};
@@ -36,8 +36,10 @@ impl Desk {
         }
     }
 
+    /// One that accepts without end, or waits for who does not come, would hold up the test for ever.
     pub(crate) fn poll(&mut self, timeout: Duration) {
-        self.server.poll(&self.memory, timeout, &mut self.events).unwrap();
+        let Self { memory, server, events, .. } = self;
+        watched(2 * limit(), "a turn of the server", || server.poll(memory, timeout, events)).unwrap();
     }
 
     /// Connects and lets the server accept.

@@ -142,6 +142,58 @@ fn a_film_ends_links_in_its_directory_and_tells_what_an_earlier_one_left_there()
 }
 
 #[test]
+fn a_film_that_leaves_pictures_out_keeps_none_of_an_earlier_one_in_their_places() {
+    let place = place();
+    let run = |more: &[&str]| {
+        let film =
+            ["run", "scene.toml", "--seconds", "1", "--frames", "film", "--fps", "50", "--picture-size"];
+        place.run([&film[..], more].concat())
+    };
+    let said = run(&["64x48", "--clock", "virtual"]);
+    if are_missing(&said) {
+        return;
+    }
+    assert_eq!(said.status, Some(0), "{}", said.err);
+    // No processor draws these as fast as they are due; what a graphics card does leaves nothing out.
+    let said = run(&["3840x2160", "--headless"]);
+    assert_eq!(said.status, Some(0), "{}", said.err);
+    println!("{}", said.out.lines().find(|line| line.starts_with("pictures")).expect("they are told"));
+    assert!(!said.out.contains("OLDER"), "{}", said.out);
+    let left = std::fs::read_dir(place.path("film")).expect("a directory");
+    for entry in left.map(|entry| entry.expect("an entry").path()) {
+        let found = size(&std::fs::read(&entry).expect("a picture"));
+        assert_eq!(found, [3840, 2160], "{} is the earlier film's", entry.display());
+    }
+}
+
+#[test]
+fn a_directory_in_which_another_run_makes_a_film_is_refused() {
+    let place = place();
+    let film = [
+        "run",
+        "scene.toml",
+        "--clock",
+        "virtual",
+        "--seconds",
+        "0.1",
+        "--frames",
+        "film",
+        "--record",
+        "out.csv",
+    ];
+    std::fs::create_dir(place.path("film")).expect("room");
+    let other = std::fs::File::open(place.path("film")).expect("it is there");
+    other.try_lock().expect("nobody else");
+    let said = place.run(film);
+    assert_eq!(said.status, Some(2), "{}", said.err);
+    assert!(said.err.contains("--frames film: somebody holds a lock on it"), "{}", said.err);
+    assert!(!place.path("out.csv").exists(), "nothing runs");
+    drop(other);
+    let said = place.run(film);
+    assert!(are_missing(&said) || said.status == Some(0), "{}", said.err);
+}
+
+#[test]
 fn what_cannot_be_drawn_or_written_is_told() {
     let place = place();
     let run = |more: &[&str]| {

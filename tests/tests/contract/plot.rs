@@ -157,3 +157,43 @@ fn pictures_of_entities_lie_in_their_directory_whatever_a_recording_calls_them()
     let title = std::fs::read_to_string(place.path("pictures/entity-3.svg")).expect("a picture");
     assert!(title.contains("../away"), "it is called by its name in the picture: {title}");
 }
+
+#[test]
+fn a_picture_replaces_no_input_of_its_run_and_tells_what_it_replaces() {
+    let place = Workplace::new();
+    recorded(&place, "lift", 0.5);
+    // A height map that is called as the picture would be: 2 x 2, flat.
+    let mut heights = Vec::new();
+    let mut encoder = png::Encoder::new(&mut heights, 2, 2);
+    encoder.set_color(png::ColorType::Grayscale);
+    encoder.write_header().and_then(|mut writer| writer.write_image_data(&[9; 4])).expect("a picture");
+    std::fs::write(place.path("lift.png"), &heights).expect("room");
+    let map = "height_map = { file = \"lift.png\", amplitude_m = 0.001, size_m = [0.5, 0.5] }\n[[finger]]";
+    place.write("lift.toml", SCENE.replace("MU", "0.5").replace("[[finger]]", map));
+    let said =
+        place.run(["run", "lift.toml", "--hand", "hand.csv", "--clock", "virtual", "--record", "lift.mcap"]);
+    assert_eq!(said.status, Some(0), "{}", said.err);
+    let said = place.run(["plot", "lift.mcap"]);
+    assert_eq!(said.status, Some(2), "{}", said.err);
+    assert!(
+        said.err.contains(
+            "the picture lift.png would overwrite an input of the run that is recorded in lift.mcap"
+        ),
+        "{}",
+        said.err
+    );
+    assert_eq!(std::fs::read(place.path("lift.png")).expect("there"), heights);
+    assert!(!place.path("lift.svg").exists(), "nothing is written");
+
+    let first = place.run(["plot", "lift.mcap", "--out", "felt"]);
+    assert_eq!(
+        (first.status, first.out.contains("replaced")),
+        (Some(0), false),
+        "{}{}",
+        first.out,
+        first.err
+    );
+    let again = place.run(["plot", "lift.mcap", "--out", "felt"]);
+    assert_eq!(again.status, Some(0), "{}", again.err);
+    assert!(again.out.contains("replaced     felt.svg\nreplaced     felt.png\n"), "{}", again.out);
+}

@@ -210,3 +210,27 @@ fn the_table_of_recordings_names_every_source_in_their_directory() {
     let found: BTreeSet<String> = names.filter(|name| name != "mod.rs").collect();
     assert_eq!(found.iter().map(String::as_str).collect::<BTreeSet<_>>(), listed);
 }
+
+/// Names of the packages of this workspace on which this one depends, but for its tests.
+fn own_dependencies(package: &str) -> BTreeSet<String> {
+    let manifest: toml::Table = read(&format!("{package}/Cargo.toml")).parse().expect("a manifest");
+    let workspace: toml::Table = read("Cargo.toml").parse().expect("a manifest");
+    let own = workspace["workspace"]["dependencies"].as_table().expect("a table");
+    let is_own = |name: &&String| own.get(*name).is_some_and(|found| found.get("path").is_some());
+    manifest["dependencies"].as_table().expect("a table").keys().filter(is_own).cloned().collect()
+}
+
+#[test]
+fn whoever_steps_what_moves_is_said_to_by_the_table_of_crates_and_nobody_is_said_to_move_nothing() {
+    let document = architecture();
+    assert!(!document.contains("moves nothing"), "`world` steps bodies");
+    let table = part(&document, "\n| crate | holds | may not know |\n|---|---|---|\n", "\n\n");
+    for package in ["app/calibration", "app/haptics", "app/physics", "app/plot", "app/view", "app/world"] {
+        let beginning = format!("| `{package}` |");
+        let row = table.lines().find(|row| row.starts_with(&beginning));
+        let row = row.unwrap_or_else(|| panic!("the table of crates has no row of {package}"));
+        let is_told = row.contains("by `physics`") || package == "app/physics";
+        let steps = own_dependencies(package).contains("physics") || package == "app/physics";
+        assert_eq!(is_told, steps, "{package} depends on physics: {steps}; its row: {row}");
+    }
+}

@@ -114,3 +114,48 @@ fn a_c_program_zeroes_the_arm_pushes_and_stops_the_motors_in_every_way() {
     // Every value that was ever written was good.
     operator.stand.finish_after_death();
 }
+
+/// Whoever allocates holds a lock, and a handler that waits for it waits for the thread that it has interrupted.
+#[test]
+fn a_c_program_stops_the_motors_in_a_signal_handler_that_interrupts_allocations() {
+    /// Each of them at another point of the program. The first handlers are the ones that count: one in ten of them or
+    /// more comes while the lock is held.
+    const STOPS: &str = "200";
+    let stand = Stand::start(setup(""));
+    let directory = stand.path("driver.sock").parent().expect("a directory").to_path_buf();
+    let Some(handler) = compiled("handler", HEADERS, &directory) else {
+        stand.finish();
+        return;
+    };
+    let program = compiled("operator", HEADERS, &directory).expect("there is a compiler");
+    let link = stand.path("link.sock");
+    std::os::unix::fs::symlink(stand.socket(), &link).expect("a link");
+    let operator = Operator { program, stand };
+
+    let mut pusher = operator.push();
+    for place in [operator.stand.socket(), link] {
+        for what in ["send-stop", "emergency-stop"] {
+            let when = format!("{what} in a signal handler at {}", place.display());
+            let end = Running::start(Command::new(&handler).arg(&place).args([what, STOPS])).end();
+            check_stopped(&operator.stand, FaultReason::EmergencyStop, &when);
+            let said = (end.status, end.out.as_str(), end.err.as_str());
+            assert_eq!(said, (Some(0), format!("{STOPS} stops, 0 refused\n").as_str(), ""), "{when}");
+            // The last stops may still be on their way: it is refused then, or undone.
+            wait_for("the end of the fault", || {
+                operator.start(&["clear-fault"]).end();
+                std::thread::sleep(Duration::from_millis(50));
+                operator
+                    .stand
+                    .view()
+                    .read_latest()
+                    .is_some_and(|frame| frame.state != DriverState::Fault as u64)
+            });
+            operator.wait_for_force();
+        }
+    }
+    operator.ask("stop");
+    let Operator { mut stand, .. } = operator;
+    assert_eq!(stand.driver.end().status, Some(0), "it was asked to end");
+    assert_eq!(pusher.end().status, Some(0), "the driver is gone");
+    stand.finish_after_death();
+}

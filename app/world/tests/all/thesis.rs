@@ -1,9 +1,10 @@
 //! The scene files of the thesis' own program, with the content of its figures 7.2 and 7.3.
 
+use std::collections::BTreeSet;
 use std::path::Path;
 
 use nalgebra::Vector3;
-use world::thesis::{Conversion, Converted, ObjectKind, read_list, read_object};
+use world::thesis::{Conversion, Converted, KEYS, ObjectKind, read_list, read_object};
 use world::{MassSpec, Scene, SceneEntity, ShapeSpec};
 
 const FIGURE_7_2: &str = include_str!("../../../../config/scenes/thesis/objects.ini");
@@ -75,6 +76,26 @@ fn figure_7_3_is_a_red_half_kilogram_cube_that_does_not_turn() {
             "no Phantom in the list: a finger was added, since a scene needs one",
         ]
     );
+}
+
+#[test]
+fn the_manual_says_of_what_has_no_counterpart_what_a_conversion_says() {
+    let manual = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../docs/scenes.md");
+    let manual = std::fs::read_to_string(manual).expect("the manual");
+    let (_, told) = entity("Shape=Sphere\nRadius=1\nInputtable=True\n");
+    let told = told.iter().find(|told| told.contains("Inputtable")).expect("it is told");
+    assert!(
+        told.contains("at the window keys move whatever is chosen there")
+            && told.contains("nothing has to be said")
+    );
+    let said =
+        "so is `Inputtable`, which needs none: at the window the arrow keys move whatever a click has chosen";
+    assert!(manual.contains(said), "docs/scenes.md does not say: {said}");
+    let keys = |list: &str| list.split(", ").map(str::to_owned).collect::<BTreeSet<_>>();
+    let (_, rest) =
+        manual.split_once("The thesis prints the keys of one object: `").expect("the list of keys");
+    let printed = KEYS.iter().filter(|(_, _, is_printed)| *is_printed).flat_map(|(_, list, _)| keys(list));
+    assert_eq!(keys(rest.split('`').next().expect("the list")), printed.collect());
 }
 
 #[test]

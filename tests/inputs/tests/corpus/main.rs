@@ -10,6 +10,8 @@ use input_targets::{TARGETS, Target};
 use patience::BoundedChild;
 use rustix::process::{Resource, Rlimit, getrlimit, setrlimit};
 use spoil::{Random, spoilt};
+#[cfg(feature = "application")]
+use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -67,6 +69,34 @@ fn every_target_has_a_corpus() {
     for (name, _) in TARGETS {
         assert!(!inputs(name).is_empty(), "tests/fuzz/corpus/{name} is empty or not there");
     }
+}
+
+/// Names in a folder of `tests/fuzz`, without their endings.
+#[cfg(feature = "application")]
+fn names_in(folder: &str) -> BTreeSet<String> {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../fuzz").join(folder);
+    let entries = std::fs::read_dir(&folder).unwrap_or_else(|error| panic!("{}: {error}", folder.display()));
+    let stem = |path: PathBuf| path.file_stem().expect("a name").to_str().expect("a plain name").to_owned();
+    entries.map(|entry| stem(entry.expect("an entry").path())).collect()
+}
+
+/// One that is struck from the list, or whose file is, would be tried by nobody any more.
+#[cfg(feature = "application")]
+#[test]
+fn every_target_has_a_program_for_the_fuzzer_and_every_corpus_and_program_a_target() {
+    let targets: BTreeSet<String> = TARGETS.iter().map(|(name, _)| (*name).to_owned()).collect();
+    assert_eq!(names_in("fuzz_targets"), targets, "tests/fuzz/fuzz_targets and TARGETS");
+    assert_eq!(names_in("corpus"), targets, "tests/fuzz/corpus and TARGETS");
+    let manifest = Path::new(env!("CARGO_MANIFEST_DIR")).join("../fuzz/Cargo.toml");
+    let manifest = std::fs::read_to_string(manifest).expect("a manifest");
+    let named = manifest
+        .lines()
+        .filter_map(|line| line.strip_prefix("path = \"fuzz_targets/")?.strip_suffix(".rs\""));
+    assert_eq!(
+        named.map(str::to_owned).collect::<BTreeSet<_>>(),
+        targets,
+        "tests/fuzz/Cargo.toml and TARGETS"
+    );
 }
 
 /// Else nobody would try them.

@@ -392,6 +392,36 @@ fn a_layout_and_a_figure_whose_links_lead_to_one_place_are_refused() {
 }
 
 #[test]
+fn recordings_of_later_scenes_are_written_through_no_link_and_over_no_other_file() {
+    let place = workplace();
+    place.write("next.toml", SCENE.replace("table", "ground"));
+    place.write("orders.txt", "at 0.1 swap next.toml\n");
+    place.write("precious.csv", PRECIOUS);
+    place.write("p.2.csv", PRECIOUS);
+    place.write("linked.csv", "t,f0_hip_x\n0,0\n");
+    std::os::unix::fs::symlink("linked.csv", place.path("s.2.csv")).expect("a link");
+    fs::hard_link(place.path("linked.csv"), place.path("h.2.csv")).expect("a link");
+    let run = ["run", "scene.toml", "--clock", "virtual", "--seconds", "0.3", "--orders", "orders.txt"];
+    let records = ["--record", "s.csv", "--record", "h.csv", "--record", "p.csv", "--record", "plain.csv"];
+    // A rerun writes the same files again.
+    for _ in 0..2 {
+        let said = place.run([&run[..], &records].concat());
+        assert_eq!(said.status, Some(0), "{}", said.err);
+        let read =
+            |name: &str| fs::read_to_string(place.path(name)).unwrap_or_else(|_| panic!("{name} is there"));
+        assert_eq!(read("linked.csv"), "t,f0_hip_x\n0,0\n");
+        assert_eq!(read("p.2.csv"), PRECIOUS);
+        for name in ["s.3.csv", "h.3.csv", "p.3.csv"] {
+            assert_eq!(read(name), read("plain.2.csv"), "{name}");
+            assert_says(&said.out, &[name]);
+        }
+        assert!(
+            ["s.4.csv", "h.4.csv", "p.4.csv", "plain.3.csv"].iter().all(|name| !place.path(name).exists())
+        );
+    }
+}
+
+#[test]
 fn the_recording_of_a_later_scene_that_cannot_be_made_is_the_one_that_is_told() {
     let place = workplace();
     place.write("next.toml", SCENE.replace("table", "ground"));

@@ -1,0 +1,159 @@
+//! Files of a film: numbered pictures in a directory that one run has for itself.
+//!
+//! Problem: pictures that are left out, or cannot be written, would leave those of an earlier film among the new ones.
+//! Model: the directory is claimed (flock(2)) while the run goes on. Numbers are settled in their order: one without a picture
+//! loses the earlier film's when the next one is written, those behind the last one at the end ([`FilmFiles::settle`]).
+//! Invariants: of a film without a single picture nothing is removed; what is removed is called as a picture of the film to the
+//! letter, and is a file or a link, which is not followed.
+
+use super::Film;
+use std::ffi::OsStr;
+use std::fs::{File, TryLockError};
+use std::os::unix::fs::MetadataExt;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering};
+
+/// Claims the directory of a film, which is made if it is not there. The claim ends with the file; a directory that may not be
+/// read, or of a file system without such locks, has none.
+///
+/// # Errors
+/// If it cannot be made, or somebody holds a lock on it, in words.
+pub(super) fn claim(directory: &Path) -> Result<Option<File>, String> {
+    let place = directory.display();
+    std::fs::create_dir_all(directory).map_err(|error| format!("--frames {place}: {error}"))?;
+    let Ok(file) = File::open(directory) else { return Ok(None) };
+    match file.try_lock() {
+        Err(TryLockError::WouldBlock) => Err(format!(
+            "--frames {place}: somebody holds a lock on it, as a run does that makes a film there; name another directory, \
+             or wait until it is released"
+        )),
+        Ok(()) | Err(TryLockError::Error(_)) => Ok(Some(file)),
+    }
+}
+
+/// The names of one film.
+#[derive(Debug, Clone)]
+pub(super) struct FilmFiles {
+    directory: PathBuf,
+    /// The number behind the last picture that was written; 0: there is none.
+    settled: Arc<AtomicU64>,
+    /// Pictures of another film that cannot be removed.
+    stuck: Arc<AtomicU64>,
+}
+
+impl FilmFiles {
+    pub(super) fn of(film: &Film) -> Self {
+        Self { directory: film.directory.clone(), settled: Arc::default(), stuck: Arc::default() }
+    }
+
+    /// Where the picture of this number is to be. A link there, or one of several names of a file, is that no more: a film has
+    /// files of its own, and what it led to may be what is drawn.
+    pub(super) fn place(&self, number: u64) -> PathBuf {
+        let file = self.name(number);
+        if let Ok(found) = std::fs::symlink_metadata(&file)
+            && (found.is_symlink() || found.is_file() && found.nlink() > 1)
+        {
+            // Whoever may not do that is told when the picture cannot be written.
+            let _ = std::fs::remove_file(&file);
+        }
+        file
+    }
+
+    /// The picture of this number is written.
+    pub(super) fn written(&self, number: u64) {
+        self.remove_before(number);
+        self.settled.store(number + 1, Ordering::Relaxed);
+    }
+
+    /// The film is over: so many pictures were due.
+    pub(super) fn settle(&self, due: u64) {
+        if self.settled.load(Ordering::Relaxed) > 0 {
+            self.remove_before(due);
+            self.settled.fetch_max(due, Ordering::Relaxed);
+        }
+    }
+
+    fn remove_before(&self, number: u64) {
+        for missing in self.settled.load(Ordering::Relaxed)..number {
+            let file = self.name(missing);
+            let is_picture =
+                std::fs::symlink_metadata(&file).is_ok_and(|found| found.is_file() || found.is_symlink());
+            if is_picture && std::fs::remove_file(&file).is_err() {
+                self.stuck.fetch_add(1, Ordering::Relaxed);
+            }
+        }
+    }
+
+    /// Pictures of another film in the places of this one's.
+    pub(super) fn stuck(&self) -> u64 {
+        self.stuck.load(Ordering::Relaxed)
+    }
+
+    /// Pictures of another film that lie behind those of this one.
+    pub(super) fn older(&self) -> usize {
+        let Ok(entries) = std::fs::read_dir(&self.directory) else { return 0 };
+        let settled = self.settled.load(Ordering::Relaxed);
+        let is_older = |name: &OsStr| {
+            let number = name
+                .to_str()
+                .and_then(|name| name.strip_prefix("frame-")?.strip_suffix(".png")?.parse().ok());
+            number.is_some_and(|number| number >= settled && self.name(number).file_name() == Some(name))
+        };
+        entries.flatten().filter(|entry| is_older(&entry.file_name())).count()
+    }
+
+    fn name(&self, number: u64) -> PathBuf {
+        self.directory.join(format!("frame-{number:06}.png"))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_film_leaves_nothing_of_an_earlier_one_among_its_pictures() {
+        let place = tempfile::tempdir().expect("a directory");
+        let directory = place.path().join("film");
+        let film = Film { directory: directory.clone(), fps: 10.0 };
+        let _claim = claim(&directory).expect("nobody has it");
+        let name = |number: u64| directory.join(format!("frame-{number:06}.png"));
+        let mine = place.path().join("mine");
+        std::fs::write(&mine, "mine").expect("room");
+        for number in 0..9 {
+            match number {
+                2 => std::os::unix::fs::symlink(&mine, name(number)).expect("a link"),
+                4 => std::fs::create_dir(name(number)).expect("room"),
+                _ => std::fs::write(name(number), "old").expect("room"),
+            }
+        }
+        std::fs::write(directory.join("frame-2.png"), "another's").expect("room");
+
+        let files = FilmFiles::of(&film);
+        files.settle(3);
+        assert_eq!((files.older(), name(0).exists()), (9, true), "a film without a picture replaces none");
+        for number in [1, 3] {
+            std::fs::write(files.place(number), "new").expect("room");
+            files.written(number);
+        }
+        assert!(name(5).exists(), "its picture may still come");
+        files.settle(7);
+        let left: Vec<u64> = (0..9).filter(|number| name(*number).symlink_metadata().is_ok()).collect();
+        assert_eq!(left, [1, 3, 4, 7, 8], "two new ones, no picture, and what lies behind");
+        assert_eq!((files.older(), files.stuck()), (2, 0));
+        assert_eq!(std::fs::read_to_string(&mine).expect("there"), "mine");
+        assert!(directory.join("frame-2.png").exists(), "it is not called as a picture of the film");
+    }
+
+    #[test]
+    fn a_directory_has_one_film_at_a_time() {
+        let place = tempfile::tempdir().expect("a directory");
+        let directory = place.path().join("film");
+        let first = claim(&directory).expect("nobody has it");
+        let refused = claim(&directory).expect_err("the first one has it");
+        assert!(refused.contains("film: somebody holds a lock on it"), "{refused}");
+        drop(first);
+        assert!(claim(&directory).is_ok());
+    }
+}
