@@ -396,7 +396,7 @@ fn draw_all(
 }
 
 impl Drawn {
-    /// Whether it is written.
+    /// True once it is written.
     fn note(&mut self, file: &Path, saved: std::io::Result<()>) -> bool {
         let Err(error) = saved else {
             self.written += 1;

@@ -246,7 +246,7 @@ impl Entity {
         !is_lost && shape.is_felt_by(finger_radius_m)
     }
 
-    /// Whether points [roll](crate::mesh::Mesh::point_radius_m) over it.
+    /// True if points [roll](crate::mesh::Mesh::point_radius_m) over it.
     pub(crate) fn rolls_points(&self) -> bool {
         matches!(&self.shape, Shape::Mesh(mesh) if mesh.point_radius_m() > 0.0)
     }

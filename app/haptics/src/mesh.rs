@@ -101,7 +101,7 @@ pub struct Mesh {
     has_inside: bool,
     extent_m: f64,
     longest_edge_m: f64,
-    /// Where sheets cross anything.
+    /// Zero where no sheet crosses anything.
     point_radius_m: f64,
     /// Of a convex solid.
     convex_inner_m: Option<f64>,
@@ -136,7 +136,7 @@ impl Mesh {
         &self.vertices
     }
 
-    /// Radius with which a point rolls over it as a ball \[m\]; 0: it [walks](walk). What passes through a sheet is on both sides of
+    /// Radius with which a point rolls over it as a ball \[m\]; 0: it walks. What passes through a sheet is on both sides of
     /// it, and of a point on the line in which they cross nobody can tell the side; of a ball beside it everybody can.
     pub fn point_radius_m(&self) -> f64 {
         self.point_radius_m

@@ -47,7 +47,7 @@ impl FilmFiles {
         Self { directory: film.directory.clone(), settled: Arc::default(), stuck: Arc::default() }
     }
 
-    /// Where the picture of this number is to be. A link there, or one of several names of a file, is that no more: a film has
+    /// Place of the picture of this number. A link there, or one of several names of a file, is that no more: a film has
     /// files of its own, and what it led to may be what is drawn.
     pub(super) fn place(&self, number: u64) -> PathBuf {
         let file = self.name(number);

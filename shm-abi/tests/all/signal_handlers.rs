@@ -3,7 +3,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
-/// What the header says may be called in a signal handler.
+/// Functions that the header says may be called in a signal handler.
 const FOR_HANDLERS: [&str; 9] = [
     "phantom_send_stop",
     "phantom_emergency_stop",
@@ -93,7 +93,7 @@ fn called(body: &str) -> BTreeSet<String> {
         .collect()
 }
 
-/// What each function of the header calls.
+/// Calls of each function of the header.
 fn functions(code: &str) -> BTreeMap<String, BTreeSet<String>> {
     let texts = code.split("\nstatic inline ").skip(1);
     texts

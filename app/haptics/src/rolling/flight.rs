@@ -116,8 +116,7 @@ impl<F: Foot> Ball<F> {
         if is_there { beyond } else { *self }
     }
 
-    /// Where it rests on the end of something that lies on another, at the same foot: on the other one instead, which is what it comes
-    /// to if it goes on.
+    /// The same ball on what it comes to if it goes on, where it rests on the end of something that lies on that, at the same foot.
     fn on_what_goes_on(&self, ground: &impl Ground<Foot = F>, way_B: &Vector3<f64>) -> Option<Self> {
         let ahead = self.rolled_to(ground, &(self.centre_B + way_B));
         let mut ball = *self;
@@ -243,7 +242,7 @@ impl<F: Foot> Ball<F> {
         (ball.count > 0 || far_m >= way_m).then_some(ball)
     }
 
-    /// Whether it stands for a point: by what comes nearer on its way than its radius nobody is stopped, but by what its centre
+    /// True if it stands for a point: by what comes nearer on its way than its radius nobody is stopped, but by what its centre
     /// would go through.
     fn is_as_a_point<G: Ground>(&self) -> bool {
         !G::IS_BENT && self.radius_m <= AS_A_POINT_M
@@ -330,9 +329,9 @@ const SHORTEST_LEAP: f64 = 0.375;
 const AS_A_POINT_M: f64 = 1.5e-5;
 /// In radii: shorter ways are gone in halves of the radius.
 const LONG: f64 = 4.0;
-/// How often a way along flat faces is shortened.
+/// The most times that a way along flat faces is shortened.
 const MOST_SHORTENED: u32 = 3;
-/// How often it is halved to find where such a face ends: of a way of a metre to half of a radius.
+/// The most times that it is halved to find where such a face ends: of a way of a metre to half of a radius.
 const MOST_HALVINGS: u32 = 20;
 /// Sine of the angle below which planes are the same one.
 const SAME_PLANE: f64 = 1e-10;

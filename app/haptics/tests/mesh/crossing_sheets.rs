@@ -46,7 +46,7 @@ fn stroke(finger: &mut Finger, entity: &Entity, places: &[Vector3<f64>]) -> Fing
     last
 }
 
-/// What a point feels at the end of a stroke, and what a ball of 0.1 mm does.
+/// Outputs of a point at the end of a stroke, and of a ball of 0.1 mm.
 fn felt(mesh: &Arc<Mesh>, places: &[Vector3<f64>]) -> [FingerOutput; 2] {
     let entity = touchable(mesh, Friction::None);
     [0.0, 1e-4].map(|radius_m| stroke(&mut finger(radius_m), &entity, places))

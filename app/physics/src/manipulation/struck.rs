@@ -107,7 +107,7 @@ impl Manipulation {
         is_more
     }
 
-    /// Whether the ways of two of these places may cross in the tick.
+    /// True if the ways of two of these places may cross in the tick.
     fn may_cross(&self, places: [usize; 2], entities: &[Entity], dt_s: f64) -> bool {
         let ways = places.map(|place| {
             let way_W = self.motions[place].velocity_W * dt_s;

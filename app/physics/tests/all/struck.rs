@@ -1,4 +1,4 @@
-//! What is struck, and what stands so near behind it that it comes there within the same tick.
+//! Things that are struck, and what stands so near behind them that they come there within the same tick.
 #![allow(non_snake_case)]
 
 use crate::noise::Noise;
