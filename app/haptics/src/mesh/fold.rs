@@ -2,7 +2,8 @@
 //!
 //! Problem: CAD programs and decimation leave triangles that are lower than a micrometre and turned over, flat upon the face
 //! beside them. Between the two is a slit of no width: a point slides in, and is held there when the hand has long left.
-//! Lids of holes with a ragged rim have such faces, too. A flap is as wide as it likes, but opens a slit that no finger feels.
+//! Lids of holes with a ragged rim have such faces, too. A flap of a
+//! closed part is as wide as it likes, but opens a slit that no finger feels; of a sheet it is a second layer, which stays.
 //!
 //! Model: at each such face the best of these changes is made ([`change`](super::change)):
 //! 1. An edge gives way to the other diagonal of the two faces beside it (an edge flip).
@@ -113,7 +114,7 @@ impl Thin {
             match facing {
                 Facing::Outward => height_m,
                 Facing::Inward => -height_m,
-                Facing::Both => height_m.abs(),
+                Facing::Both => 0.0,
             }
         });
         let highest_m = heights_m.into_iter().fold(0.0, f64::max);
