@@ -168,3 +168,28 @@ fn the_box_of_what_may_be_struck_becomes_small_again() {
     // On each side what comes by in a tick: both weigh the same.
     assert!(largest_m > before_m + 2.0 * 0.025 && size_m(&world) == before_m, "{before_m} m, {largest_m} m");
 }
+
+/// Two balls, of which one flies past the other: within a tick a contact has one normal, that of its beginning.
+#[test]
+fn what_passes_nearer_than_its_way_in_a_tick_explains_meets_what_it_passes() {
+    let [settings, _] = weightless(1.0);
+    for v in [1.0, 2.0, 5.0, 10.0] {
+        let (way, mut met) = (v * DT, [0; 2]);
+        let bound = way * way / (4.0 * RADIUS);
+        for (which, clearance) in [0.8 * bound, 1.02 * bound].into_iter().enumerate() {
+            for phase in 0..20 {
+                let x = -0.05 - way * f64::from(phase) / 20.0;
+                let at = Isometry3::translation(x, 0.0, 2.0 * RADIUS + clearance);
+                let coming = object(Sphere::new(RADIUS).unwrap(), at, 1000.0, 0.0);
+                let passes = body(&coming, 0.1).moving(Vector3::x() * v, Vector3::zeros());
+                let bodies = vec![(0, body(&ball(0.0), 0.1)), (1, passes)];
+                let mut world = World::new(vec![ball(0.0), coming], &bodies, settings, 0);
+                for _ in 0..(0.1 / way) as u32 {
+                    world.step(&[]);
+                }
+                met[which] += u32::from(world.manipulation.bodies()[0].velocity_W != Vector3::zeros());
+            }
+        }
+        assert!(met[0] > 0 && met[1] == 0, "{v} m/s: {met:?}");
+    }
+}
