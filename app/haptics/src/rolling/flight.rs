@@ -140,7 +140,7 @@ impl<F: Foot> Ball<F> {
         way_m: f64,
         work: &Work,
     ) -> Option<Self> {
-        if !self.is_as_a_point::<G>() || self.count == 0 {
+        if !self.is_as_a_point::<G>() || self.held() == 0 {
             return None;
         }
         let near_m = tolerance_m(ground, self.radius_m);
@@ -150,16 +150,24 @@ impl<F: Foot> Ball<F> {
                 rest.normal_B.cross(&before.normal_B).norm_squared() < SAME_PLANE * SAME_PLANE
                     && (rest.offset_m - before.offset_m).abs() <= near_m
             };
+            // What presses nothing may be left behind.
+            let [after, before] =
+                [&ball, self].map(|ball| ball.rests().iter().filter(|rest| rest.load_m > 0.0));
             let slides = !ball.is_blocked
-                && ball.count == self.count
-                && ball.rests().iter().zip(self.rests()).all(is_same);
+                && ball.held().count_ones() == self.held().count_ones()
+                && after.zip(before).all(is_same);
             slides.then_some(ball)
         };
         let least = 0.5 * self.radius_m / way_m;
+        // Most often it can not, or as far as it is asked to.
+        if 2.0 * least < 1.0 && slid(2.0 * least).is_none() {
+            return None;
+        }
         let mut far = 1.0;
         if slid(far).is_none() {
+            work.look();
             let mut beyond = far;
-            far = 0.0;
+            far = 2.0 * least;
             for _ in 0..MOST_HALVINGS {
                 if beyond - far <= least {
                     break;
@@ -331,8 +339,8 @@ const AS_A_POINT_M: f64 = 1.5e-5;
 const LONG: f64 = 4.0;
 /// The most times that a way along flat faces is shortened.
 const MOST_SHORTENED: u32 = 3;
-/// The most times that it is halved to find where such a face ends: of a way of a metre to half of a radius.
-const MOST_HALVINGS: u32 = 20;
+/// The most times that it is halved to find where such a face ends.
+const MOST_HALVINGS: u32 = 12;
 /// Sine of the angle below which planes are the same one.
 const SAME_PLANE: f64 = 1e-10;
 const MOST_OBSTACLES: usize = 6;
