@@ -27,9 +27,10 @@
  *
  * Signal handlers may call phantom_send_stop, which never waits, and phantom_emergency_stop, phantom_stop,
  * phantom_clear_fault, phantom_zero and phantom_end_lease, which wait for an answer for up to seven seconds. These call
- * nothing but what POSIX calls async-signal-safe: no allocation, no lock, no printf. They need less than 4 KiB of stack
- * and leave errno as it is. Of the others phantom_latest_tick, phantom_read_frame and phantom_is_attached may be called there;
- * phantom_attach, phantom_detach, phantom_publish and phantom_sleep_for_frame may not.
+ * nothing but what POSIX calls async-signal-safe: no allocation, no lock, no printf. They need 12 KiB of stack (4 KiB
+ * where symbols are bound at the start, -Wl,-z,now: else the first call binds them), and leave errno as it is. Of the
+ * others phantom_latest_tick, phantom_read_frame and phantom_is_attached may be called there; phantom_attach,
+ * phantom_detach, phantom_publish and phantom_sleep_for_frame may not.
  *
  * A path is never empty: every function that takes one fails then.
  */

@@ -147,13 +147,20 @@ fn is_of_others(place: &Path) -> bool {
 /// One that cannot be read tells nothing.
 fn begins_as_recording(file: &Path, bytes: u64) -> bool {
     let mut first = Vec::new();
-    let read = File::open(file).and_then(|file| file.take(MCAP.len() as u64).read_to_end(&mut first));
-    let is_known = first.starts_with(TABLE) || first == MCAP || first.first() == Some(&HALF_REPLACED);
+    let read = File::open(file).and_then(|file| file.take(FIRST_BYTES).read_to_end(&mut first));
+    let is_known = is_table(&first) || first.starts_with(MCAP) || first.first() == Some(&HALF_REPLACED);
     bytes == 0 || read.is_ok() && is_known
 }
 
-/// A table's first column, and the first bytes of MCAP.
-const TABLE: &[u8] = b"t,";
+/// True of the first bytes of a table: its second column is where the first finger's device is. A hand's file begins with a time, too.
+fn is_table(first: &[u8]) -> bool {
+    let mut columns = first.split(|&byte| byte == b',');
+    columns.next() == Some(b"t") && columns.next().is_some_and(|column| column.ends_with(b"_hip_x"))
+}
+
+/// As many as a time and a finger's name need.
+const FIRST_BYTES: u64 = 4096;
+/// First bytes of MCAP.
 const MCAP: &[u8] = b"\x89MCAP0\r\n";
 
 fn numbered(path: &Path, number: u32) -> PathBuf {
@@ -166,6 +173,12 @@ fn numbered(path: &Path, number: u32) -> PathBuf {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn what_begins_with_a_time_is_no_recording_yet() {
+        assert!(is_table(b"t,f0_hip_x,f0_hip_y") && is_table(b"t,thumb_hip_x"));
+        assert!(!is_table(b"t,f0_x,f0_y,f0_z") && !is_table(b"t,reaction_ms") && !is_table(b"t"));
+    }
 
     #[test]
     fn the_second_scene_is_recorded_beside_the_first() {
@@ -192,7 +205,7 @@ mod tests {
         std::os::unix::fs::symlink(file("nowhere"), file("w.4.csv")).expect("a link");
         std::fs::write(file("w.5.csv"), "trial,answer\n1,yes\n").expect("room");
         assert_eq!(free_place(&first, 1, &[]), file("w.6.csv"));
-        for recording in [&b"t,f0\n0,1\n"[..], b"\x89MCAP0\r\nrest", b"\0half", b""] {
+        for recording in [&b"t,f0_hip_x,f0_hip_y\n0,1,2\n"[..], b"\x89MCAP0\r\nrest", b"\0half", b""] {
             std::fs::write(file("w.6.csv"), recording).expect("room");
             assert_eq!(free_place(&first, 1, &[]), file("w.6.csv"), "a rerun writes the same files again");
         }
