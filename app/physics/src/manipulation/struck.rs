@@ -25,6 +25,8 @@ const CORNER: f64 = 7.0;
 const WHIP: f64 = 1.5;
 /// Way in a tick up to which nothing is fast \[m\]: what is struck then goes twice as far, and things are thicker than that.
 const FAST_M: f64 = 4e-3;
+/// Where more may be struck in a tick, as in an explosion, nobody looks farther: everything would be near everything.
+const MOST_STRUCK: usize = 16;
 /// Boxes that were made larger are made smaller once in so many ticks.
 const TICKS_TO_SHRINK: u64 = 16;
 
@@ -102,6 +104,12 @@ impl Manipulation {
                     is_more = true;
                 }
             }
+        }
+        if self.struck.now.len() > MOST_STRUCK {
+            let Struck { now, by_body_m_s, .. } = &mut self.struck;
+            now.drain(..).for_each(|body| by_body_m_s[body as usize] = 0.0);
+            self.line_up_struck();
+            return false;
         }
         if is_more {
             self.make_boxes_large(entities, dt_s);
