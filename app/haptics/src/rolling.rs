@@ -40,6 +40,7 @@
 
 mod ball;
 mod depenetration;
+mod far;
 mod flight;
 mod ground;
 mod pace;

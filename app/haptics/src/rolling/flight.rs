@@ -4,7 +4,8 @@
 //! is first touched, found by the false position. Through free space it leaps as far as nothing is near.
 //!
 //! Invariants: a move begins and ends where nothing is nearer than r; over a surface it is no longer than half of r, so
-//! that the centre, with room of r around it, cannot come to the other side of anything, or its way goes through nothing.
+//! that the centre, with room of r around it, cannot come to the other side of anything, or as [`far`](super::far) as it goes through
+//! nothing.
 //! Cost: one bounded query; at something new some ten walks of a foot more.
 
 use std::cell::Cell;
@@ -21,7 +22,7 @@ use crate::mesh::TooMany;
 pub(super) struct Work(Cell<u32>);
 
 impl Work {
-    fn look(&self) {
+    pub(super) fn look(&self) {
         self.0.set(self.0.get().saturating_add(1));
     }
 
@@ -130,68 +131,6 @@ impl<F: Foot> Ball<F> {
         Some(ball)
     }
 
-    /// A long way along the flat faces and straight edges that it rests on, if it stands for a point: its centre goes straight, and
-    /// through nothing; and where it comes to nothing is nearer than the radius.
-    #[inline(never)]
-    fn slid_far<G: Ground<Foot = F>>(
-        &self,
-        ground: &G,
-        way_B: &Vector3<f64>,
-        way_m: f64,
-        work: &Work,
-    ) -> Option<Self> {
-        if !self.is_as_a_point::<G>() || self.held() == 0 {
-            return None;
-        }
-        let near_m = tolerance_m(ground, self.radius_m);
-        let slid = |share: f64| {
-            let ball = self.rolled_to(ground, &(self.centre_B + way_B * share));
-            let is_same = |(rest, before): (&Rest<F>, &Rest<F>)| {
-                rest.normal_B.cross(&before.normal_B).norm_squared() < SAME_PLANE * SAME_PLANE
-                    && (rest.offset_m - before.offset_m).abs() <= near_m
-            };
-            // What presses nothing may be left behind.
-            let [after, before] =
-                [&ball, self].map(|ball| ball.rests().iter().filter(|rest| rest.load_m > 0.0));
-            let slides = !ball.is_blocked
-                && ball.held().count_ones() == self.held().count_ones()
-                && after.zip(before).all(is_same);
-            slides.then_some(ball)
-        };
-        let least = 0.5 * self.radius_m / way_m;
-        // Most often it can not, or as far as it is asked to.
-        if 2.0 * least < 1.0 && slid(2.0 * least).is_none() {
-            return None;
-        }
-        let mut far = 1.0;
-        if slid(far).is_none() {
-            work.look();
-            let mut beyond = far;
-            far = 2.0 * least;
-            for _ in 0..MOST_HALVINGS {
-                if beyond - far <= least {
-                    break;
-                }
-                let middle = 0.5 * (far + beyond);
-                if slid(middle).is_some() { far = middle } else { beyond = middle }
-            }
-        }
-        for _ in 0..MOST_SHORTENED {
-            if far <= least {
-                return None;
-            }
-            let ball = slid(far)?;
-            work.look();
-            let met = ground.crossed_at([&self.centre_B, &ball.centre_B]);
-            if met.is_none() && matches!(ball.obstacle(ground), Ok(None)) {
-                return Some(ball);
-            }
-            // Twice the radius before what it meets; where that is beside its way, some radii back.
-            far = far * met.unwrap_or(1.0) - 4.0 * least;
-        }
-        None
-    }
-
     /// Straight to `target_B` through free space: it is there, or where it first touches something.
     ///
     /// `None` where it began with something nearer than it may be.
@@ -215,9 +154,7 @@ impl<F: Foot> Ball<F> {
             if safe_m < -2.0 * tolerance_m(ground, radius_m) {
                 return None;
             }
-            if ball.is_as_a_point::<G>()
-                && let Some(flown) = ball.flown_far(ground, &way_B, left_m)
-            {
+            if let Some(flown) = ball.flown_far(ground, &way_B, left_m) {
                 return Some(flown);
             }
             // Along a surface nothing is safe: some way, and a look back.
@@ -234,30 +171,8 @@ impl<F: Foot> Ball<F> {
         Some(ball)
     }
 
-    /// A long way through free space, to its end or to the surface that its centre would go through.
-    fn flown_far(&self, ground: &impl Ground<Foot = F>, way_B: &Vector3<f64>, way_m: f64) -> Option<Self> {
-        let target_B = self.centre_B + way_B;
-        let far_m = ground
-            .crossed_at([&self.centre_B, &target_B])
-            .map_or(way_m, |share| share * way_m - 0.5 * self.radius_m);
-        if far_m <= LONG * self.radius_m {
-            return None;
-        }
-        let (from_B, leap_B) = (self.centre_B, way_B * (far_m / way_m));
-        let ball = self.first_touch(ground, &Work::default(), |share| {
-            Self::in_free_space(from_B + leap_B * share, self.radius_m)
-        })?;
-        (ball.count > 0 || far_m >= way_m).then_some(ball)
-    }
-
-    /// True if it stands for a point: by what comes nearer on its way than its radius nobody is stopped, but by what its centre
-    /// would go through.
-    fn is_as_a_point<G: Ground>(&self) -> bool {
-        !G::IS_BENT && self.radius_m <= AS_A_POINT_M
-    }
-
     /// The end of a path, or where on it something new is first touched; `None` if that cannot be told.
-    fn first_touch(
+    pub(super) fn first_touch(
         &self,
         ground: &impl Ground<Foot = F>,
         work: &Work,
@@ -333,16 +248,6 @@ fn touching<F: Foot>(
 /// As far is looked ahead at least \[m\]: of a small ball that costs no more.
 const LEAST_AHEAD_M: f64 = 1e-3;
 const SHORTEST_LEAP: f64 = 0.375;
-/// Radius of balls that stand for points, at most \[m\].
-const AS_A_POINT_M: f64 = 1.5e-5;
-/// In radii: shorter ways are gone in halves of the radius.
-const LONG: f64 = 4.0;
-/// The most times that a way along flat faces is shortened.
-const MOST_SHORTENED: u32 = 3;
-/// The most times that it is halved to find where such a face ends.
-const MOST_HALVINGS: u32 = 12;
-/// Sine of the angle below which planes are the same one.
-const SAME_PLANE: f64 = 1e-10;
 const MOST_OBSTACLES: usize = 6;
 /// Enough for a finger to roll on over plain faces for as many halves of its radius as there are rounds.
 const MOST_WORK: u32 = 64;

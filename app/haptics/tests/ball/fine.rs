@@ -9,20 +9,9 @@ use nalgebra::Vector3;
 
 const ROUND_M: f64 = 0.08;
 
-/// The cap of a ball of triangles of this size, open below; its middle is the origin.
+/// The cap of a ball of triangles of this size, open below.
 fn dome(cell_m: f64) -> TriangleSoup {
-    let cells = (0.04 / cell_m) as u32;
-    let at = |place: u32| cell_m * (f64::from(place) - 0.5 * f64::from(cells));
-    let mut all = TriangleSoup::default();
-    for (i, j) in (0..=cells).flat_map(|i| (0..=cells).map(move |j| (i, j))) {
-        let [x, z] = [at(i), at(j)];
-        all.vertices.push(Vector3::new(x, (ROUND_M * ROUND_M - x * x - z * z).sqrt(), z));
-    }
-    for (i, j) in (0..cells).flat_map(|i| (0..cells).map(move |j| (i, j))) {
-        let [a, b] = [i * (cells + 1) + j, (i + 1) * (cells + 1) + j];
-        all.faces.extend([[a, a + 1, b + 1], [a, b + 1, b]]);
-    }
-    all
+    sheet((0.04 / cell_m) as u32, 0.04, |x, z| (ROUND_M * ROUND_M - x * x - z * z).sqrt())
 }
 
 /// Without friction the centre is where it is nearest to the HIP: straight above it, but for what faces are flat.

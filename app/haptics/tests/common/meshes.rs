@@ -22,6 +22,19 @@ pub(crate) fn cube() -> Arc<Mesh> {
     built(make::cuboid([0.1; 3]))
 }
 
+/// An open square of so many cells each way, of such a height above x and z.
+pub(crate) fn sheet(cells: u32, size_m: f64, height: impl Fn(f64, f64) -> f64) -> TriangleSoup {
+    let at = |place: u32| size_m * (f64::from(place) / f64::from(cells) - 0.5);
+    let mut all = TriangleSoup::default();
+    let places = (0..=cells).flat_map(|i| (0..=cells).map(move |j| [at(i), at(j)]));
+    all.vertices.extend(places.map(|[x, z]| Vector3::new(x, height(x, z), z)));
+    for (i, j) in (0..cells).flat_map(|i| (0..cells).map(move |j| (i, j))) {
+        let [a, b] = [i * (cells + 1) + j, (i + 1) * (cells + 1) + j];
+        all.faces.extend([[a, a + 1, b + 1], [a, b + 1, b]]);
+    }
+    all
+}
+
 pub(crate) fn plate() -> Arc<Mesh> {
     built(make::cuboid([0.1, 2e-3, 0.1]))
 }

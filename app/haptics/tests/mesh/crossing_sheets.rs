@@ -3,6 +3,7 @@
 
 use std::sync::Arc;
 
+use crate::common::flawed::together;
 use crate::common::meshes::*;
 use crate::common::*;
 use haptics::mesh::{Mesh, TriangleSoup, make};
@@ -17,13 +18,6 @@ fn quads(quads: &[[[f64; 3]; 4]]) -> TriangleSoup {
         all.vertices.extend(corners.iter().copied().map(Vector3::from));
         all.faces.extend([[first, first + 1, first + 2], [first, first + 2, first + 3]]);
     }
-    all
-}
-
-fn with(mut all: TriangleSoup, other: TriangleSoup) -> TriangleSoup {
-    let first = all.vertices.len() as u32;
-    all.vertices.extend(other.vertices);
-    all.faces.extend(other.faces.iter().map(|face| face.map(|corner| corner + first)));
     all
 }
 
@@ -98,7 +92,7 @@ fn around_the_upright_edges_of_an_open_wall_a_finger_is_let_go() {
         let turn = Isometry3::from_parts(Vector3::new(0.0013, 0.0, -0.0007).into(), turn);
         let floor = || if case % 2 == 0 { quads(&[FLOOR]) } else { moved_cuboid() };
         for outline in [&corner[..], &tube] {
-            let mesh = built(with(floor(), turned(walls(outline), &turn)));
+            let mesh = built(together([floor(), turned(walls(outline), &turn)]));
             for (number, stroke) in strokes.iter().enumerate() {
                 let places: Vec<_> =
                     stroke.iter().map(|at| (turn * nalgebra::Point3::from(*at)).coords).collect();
@@ -128,7 +122,7 @@ fn at_the_end_of_a_leaning_wall_a_finger_is_let_go() {
             let at = |y: f64, z: f64| [y * lean, y, z + y * slant];
             let wall = [at(-0.01, -0.015), at(-0.01, 0.015), at(0.02, 0.015), at(0.02, -0.015)];
             for floor in [quads(&[FLOOR]), moved_cuboid()] {
-                let mesh = built(with(floor, quads(&[wall])));
+                let mesh = built(together([floor, quads(&[wall])]));
                 for side in [1.0, -1.0] {
                     let way = [
                         [0.02, 0.01, 0.0],
@@ -165,12 +159,12 @@ fn past_the_ends_of_walls_that_are_one_a_finger_is_let_go() {
         for cells in [1, 3] {
             let mut other = quads(&[wall(0.029)]);
             if cells > 1 {
-                other = surface(cells, |_, _| 0.0);
+                other = sheet(cells, 0.1, |_, _| 0.0);
                 for at in &mut other.vertices {
                     *at = Vector3::new(0.0, 0.01 + 0.4 * at.x, -5e-4 + 0.59 * at.z);
                 }
             }
-            let mesh = built(with(with(floor.clone(), quads(&[wall(0.03)])), other));
+            let mesh = built(together([floor.clone(), quads(&[wall(0.03)]), other]));
             let [point, ball] = felt(&mesh, &places[..4]);
             for (felt, radius_m) in [(point, 0.0), (ball, 1e-4)] {
                 let on_floor_m = (felt.force_on_user_W.norm() / K - 1e-3 - radius_m).abs();
@@ -193,7 +187,7 @@ fn in_the_wedge_of_sheets_that_cross_in_one_line_a_finger_is_let_go() {
         let floors = [Some(quads(&[FLOOR])), Some(moved_cuboid()), None];
         for (number, floor) in floors.into_iter().enumerate() {
             let has_floor = floor.is_some();
-            let mesh = built(with(floor.unwrap_or_default(), sheets.clone()));
+            let mesh = built(together([floor.unwrap_or_default(), sheets.clone()]));
             for wedge in 0..count {
                 let angle = 0.2 + std::f64::consts::PI * (f64::from(wedge) + 0.5) / f64::from(count);
                 let at = |along: f64, aside: f64, y: f64| {
@@ -235,13 +229,67 @@ fn a_wall_holds_beside_a_heap_of_leaves() {
         leaves.push([corner(-0.02, -0.02), corner(-0.02, 0.02), corner(0.02, 0.02), corner(0.02, -0.02)]);
     }
     let wall = [[0.0, -0.01, -0.03], [0.0, -0.01, 0.03], [0.0, 0.03, 0.03], [0.0, 0.03, -0.03]];
-    let mesh = built(with(quads(&leaves), quads(&[FLOOR, wall])));
+    let mesh = built(together([quads(&leaves), quads(&[FLOOR, wall])]));
     let places = [[-0.02, 0.01, 1e-3], [-0.02, -1e-3, 1e-3], [0.01, -1e-3, 1e-3]].map(Vector3::from);
     let [point, _] = felt(&mesh, &places);
     assert!((point.force_on_user_W - Vector3::new(-0.01, 1e-3, 0.0) * K).norm() < 1e-4 * K, "{point:?}");
     let places: Vec<_> = places.into_iter().chain([Vector3::new(-0.03, 0.01, 1e-3)]).collect();
     let [point, _] = felt(&mesh, &places);
     assert!(point.entity.is_none(), "{point:?}");
+}
+
+/// As many closed boxes that pass through each other that nobody looks at all of them: in doubt, sheets cross.
+#[test]
+fn a_wall_holds_beside_a_heap_of_boxes() {
+    let mut noise = Noise(4);
+    let boxes = (0..400).map(|_| {
+        let turn = UnitQuaternion::new(noise.vector(2.0));
+        let place = Isometry3::from_parts((Vector3::x() * 0.2 + noise.vector(2e-3)).into(), turn);
+        turned(make::cuboid([0.02; 3]), &place)
+    });
+    let boxes = together(boxes);
+    let wall = [[0.0, -0.01, -0.03], [0.0, -0.01, 0.03], [0.0, 0.03, 0.03], [0.0, 0.03, -0.03]];
+    let mesh = built(together([quads(&[FLOOR, wall]), boxes]));
+    let places = [[-0.02, 0.01, 1e-3], [-0.02, -1e-3, 1e-3], [0.01, -1e-3, 1e-3]].map(Vector3::from);
+    let [point, _] = felt(&mesh, &places);
+    assert!((point.force_on_user_W - Vector3::new(-0.01, 1e-3, 0.0) * K).norm() < 1e-4 * K, "{point:?}");
+}
+
+/// Among leaves that cross, wherever a hand rests: the god-object comes to rest, and the whole spring is felt.
+#[test]
+fn among_leaves_that_cross_a_finger_comes_to_rest() {
+    let mut held = 0;
+    for seed in 0..200 {
+        let mut noise = Noise(seed);
+        let leaves = (0..16).map(|_| {
+            let (turn, middle) = (UnitQuaternion::new(noise.vector(2.0)), noise.vector(0.02));
+            let corner = |x: f64, z: f64| (middle + turn * Vector3::new(x, 0.0, z)).into();
+            [corner(-0.01, -0.01), corner(-0.01, 0.01), corner(0.01, 0.01), corner(0.01, -0.01)]
+        });
+        let entity = touchable(&built(quads(&leaves.collect::<Vec<_>>())), Friction::None);
+        let mut finger = point_finger();
+        let mut from = Vector3::x() * 0.05;
+        for _ in 0..20 {
+            let to = noise.vector(0.03);
+            stroke(&mut finger, &entity, &[from, to]);
+            let rests = (0..100).map(|_| step(&mut finger, &entity, &to)).last().unwrap();
+            from = to;
+            if rests.entity.is_none() {
+                continue;
+            }
+            held += 1;
+            let spring = (rests.god_object_W - to) * K;
+            let again = step(&mut finger, &entity, &to);
+            let moves_m = (again.god_object_W - rests.god_object_W).norm();
+            // What it is let down by is one radius, along one of two walls.
+            let off_n = (rests.force_on_user_W - spring).norm();
+            assert!(
+                moves_m < 1e-9 && off_n < 2e-5 * K + 0.02 * spring.norm(),
+                "{seed}: {moves_m} m, {rests:?}, {to:?}"
+            );
+        }
+    }
+    assert!(held > 300, "{held}");
 }
 
 /// A point that rolls is where it would be if nothing crossed the surface elsewhere, however fast it goes: over flat faces and round
@@ -254,17 +302,18 @@ fn a_point_that_rolls_feels_what_one_that_walks_does() {
     let dome = |x: f64, z: f64| (0.08_f64.powi(2) - x * x - z * z).sqrt() - 0.08;
     let ridges = |x: f64, _: f64| 2e-3 - 2.0 * (x.rem_euclid(8e-3) - 4e-3).abs();
     for (name, soup, ways_m) in [
-        ("flat", surface(1, flat), [1e-4, 1e-3, 4e-3]),
-        ("flat", surface(40, flat), [1e-4, 1e-3, 4e-3]),
-        ("dome", surface(50, dome), [1e-4, 5e-4, 1e-3]),
-        ("ridges", surface(50, ridges), [1e-4, 5e-4, 1e-3]),
+        ("flat", sheet(1, 0.1, flat), [1e-4, 1e-3, 4e-3]),
+        ("flat", sheet(40, 0.1, flat), [1e-4, 1e-3, 4e-3]),
+        ("dome", sheet(50, 0.1, dome), [1e-4, 5e-4, 1e-3]),
+        ("ridges", sheet(50, 0.1, ridges), [1e-4, 5e-4, 1e-3]),
     ] {
         for scale in [1.0, 0.1] {
             let scaled = |mut soup: TriangleSoup| {
                 soup.vertices.iter_mut().for_each(|at| *at *= scale);
                 soup
             };
-            let [rolled, walked] = [with(soup.clone(), far()), soup.clone()].map(|soup| built(scaled(soup)));
+            let [rolled, walked] =
+                [together([soup.clone(), far()]), soup.clone()].map(|soup| built(scaled(soup)));
             assert!(rolled.point_radius_m() > 0.0 && walked.point_radius_m() == 0.0);
             for (friction, is_along, way_m) in
                 [Friction::None, Friction::coulomb(0.4).unwrap()].into_iter().flat_map(|friction| {
@@ -307,19 +356,6 @@ fn a_point_that_rolls_feels_what_one_that_walks_does() {
             }
         }
     }
-}
-
-/// Of so many cells each way, of such a height.
-fn surface(cells: u32, height: impl Fn(f64, f64) -> f64) -> TriangleSoup {
-    let at = |place: u32| 0.1 * (f64::from(place) / f64::from(cells) - 0.5);
-    let mut all = TriangleSoup::default();
-    let places = (0..=cells).flat_map(|i| (0..=cells).map(move |j| [at(i), at(j)]));
-    all.vertices.extend(places.map(|[x, z]| Vector3::new(x, height(x, z), z)));
-    for (i, j) in (0..cells).flat_map(|i| (0..cells).map(move |j| (i, j))) {
-        let [a, b] = [i * (cells + 1) + j, (i + 1) * (cells + 1) + j];
-        all.faces.extend([[a, a + 1, b + 1], [a, b + 1, b]]);
-    }
-    all
 }
 
 /// Each mesh is a floor and a wall of its own; the walls are behind one another.

@@ -1,5 +1,6 @@
 //! Parts that overlap without an edge in common, as artists join them: felt as one solid, of which crossings are concave edges.
 
+use crate::common::flawed::together;
 use crate::common::meshes::*;
 use crate::common::*;
 use crate::mesh_oracle::winding_number;
@@ -215,17 +216,8 @@ fn along_a_floor_a_finger_comes_to_the_open_wall_that_stands_in_it() {
     }
 }
 
-/// An open floor of so many cells each way.
 fn open_floor(cells: u32) -> TriangleSoup {
-    let mut all = TriangleSoup::default();
-    let at = |place: u32| 0.12 * (f64::from(place) / f64::from(cells) - 0.5);
-    let places = (0..=cells).flat_map(|i| (0..=cells).map(move |j| (i, j)));
-    all.vertices.extend(places.map(|(i, j)| Vector3::new(at(i), 0.0, at(j))));
-    for (i, j) in (0..cells).flat_map(|i| (0..cells).map(move |j| (i, j))) {
-        let [a, b] = [i * (cells + 1) + j, (i + 1) * (cells + 1) + j];
-        all.faces.extend([[a, a + 1, b + 1], [a, b + 1, b]]);
-    }
-    all
+    sheet(cells, 0.12, |_, _| 0.0)
 }
 
 /// To where a wall stands in a floor, and from there back, along it, up it and away.
@@ -317,9 +309,7 @@ fn a_finger_leaves_a_post_of_many_sides_that_stands_in_an_open_floor() {
         if is_closed {
             (1..5).for_each(|at| all.faces.extend([[0, at, at + 1], [6, at + 7, at + 6]]));
         }
-        let (floor, first) = (open_floor(1 + case as u32 / 8), all.vertices.len() as u32);
-        all.vertices.extend(floor.vertices);
-        all.faces.extend(floor.faces.iter().map(|face| face.map(|corner| corner + first)));
+        let all = together([all, open_floor(1 + case as u32 / 8)]);
         let entity = touchable(&built(all), Friction::None);
         let mut finger = point_finger();
         let hips = [
