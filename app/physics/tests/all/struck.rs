@@ -193,3 +193,29 @@ fn what_passes_nearer_than_its_way_in_a_tick_explains_meets_what_it_passes() {
         assert!(met[0] > 0 && met[1] == 0, "{v} m/s: {met:?}");
     }
 }
+
+/// In an explosion everything may strike everything: who looked for all of that would leave out contacts for want of room.
+#[test]
+fn in_an_explosion_no_contact_is_left_out() {
+    let [settings, _] = weightless(1.0);
+    let mut noise = Noise::new(3);
+    let (mut entities, mut bodies) = (Vec::new(), Vec::new());
+    for place in 0..300_u32 {
+        let [x, y, z] = [place % 7, place / 7 % 7, place / 49].map(|at| 0.025 * f64::from(at) - 0.075);
+        let at = Isometry3::from_parts(Vector3::new(x, y, z).into(), noise.turn());
+        let shape: Shape = if place % 2 == 0 {
+            Cuboid::new([0.012; 3]).unwrap().into()
+        } else {
+            Sphere::new(0.008).unwrap().into()
+        };
+        let thing = object(shape, at, 1000.0, 0.3);
+        let flies = body(&thing, noise.log_within(0.005, 0.05)).moving(noise.vector(8.0), noise.vector(20.0));
+        bodies.push((place as usize, flies));
+        entities.push(thing);
+    }
+    let mut world = World::new(entities, &bodies, settings, 0);
+    for _ in 0..60 {
+        world.step(&[]);
+    }
+    assert_eq!(world.manipulation.left_out(), 0);
+}
