@@ -25,7 +25,7 @@ const CORNER: f64 = 7.0;
 const WHIP: f64 = 1.5;
 /// Way in a tick up to which nothing is fast \[m\]: what is struck then goes twice as far, and things are thicker than that.
 const FAST_M: f64 = 4e-3;
-/// Where more may be struck in a tick, as in an explosion, nobody looks farther: everything would be near everything.
+/// The most that are looked for in a tick: where more may be struck, as in an explosion, everything would be near everything.
 const MOST_STRUCK: usize = 16;
 /// Boxes that were made larger are made smaller once in so many ticks.
 const TICKS_TO_SHRINK: u64 = 16;
