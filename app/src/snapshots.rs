@@ -21,7 +21,6 @@ use film_files::FilmFiles;
 use io_driver::say::say;
 use rt_core::limits;
 use std::collections::VecDeque;
-use std::fs::File;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -42,8 +41,6 @@ pub struct Snapshots {
     shots: Vec<Shot>,
     film: Option<Film>,
     files: Option<FilmFiles>,
-    /// Of the film's directory, to the end of the run.
-    claim: Option<File>,
     /// Pictures of the film that were due.
     due: u64,
     left_out: u64,
@@ -136,13 +133,13 @@ impl Snapshots {
         camera_of(&stage, wanted.camera.as_deref())?;
         let claimed = wanted.film.as_ref().map(|film| film_files::claim(&film.directory)).transpose()?;
         let look = wanted.clone();
-        let files = wanted.film.as_ref().map(FilmFiles::of);
+        let files = wanted.film.as_ref().zip(claimed).map(|(film, claim)| FilmFiles::of(film, claim));
         let own = files.clone();
         let draw = move |work: Receiver<Work>, steps: &Progress, written: &AtomicU64| {
             draw_all(stage, &look, own.as_ref(), &work, (steps, written))
         };
         let snapshots = Self::drawn_by(draw, wanted, moments, period_ns, (waits, STUCK))?;
-        Ok(Self { files, claim: claimed.flatten(), ..snapshots })
+        Ok(Self { files, ..snapshots })
     }
 
     /// The same with somebody else who draws.
@@ -167,7 +164,6 @@ impl Snapshots {
             shots,
             film: wanted.film.clone(),
             files: None,
-            claim: None,
             due: 0,
             left_out: 0,
             waits,
@@ -285,7 +281,7 @@ impl Snapshots {
             }
             (older, strange) = (files.older(), files.stuck());
         }
-        drop(self.claim.take());
+        drop(self.files.take());
         let failure = self.given_up.or(drawn.failure);
         let missing = if failure.is_some() { self.asked.saturating_sub(drawn.written) } else { 0 };
         let (left_out, not_reached) = (self.left_out, self.shots.len());
@@ -377,7 +373,7 @@ fn draw_all(
             Ok(Work::Picture(moment, file)) => (moment, file, None),
             Ok(Work::Frame(moment, number)) => {
                 let Some(film) = film else { continue };
-                (moment, film.place(number), Some((film, number)))
+                (moment, film.name(number), Some((film, number)))
             }
             Err(_) => return drawn,
         };
@@ -385,7 +381,8 @@ fn draw_all(
         drawn.renderer = studio.renderer().to_owned();
         let picture = studio.take(&moment, camera, eyes);
         steps.take();
-        if drawn.note(&file, picture.save(&file))
+        let is_ready = number.map_or(Ok(()), |(film, number)| film.ready(number));
+        if drawn.note(&file, is_ready.and_then(|()| picture.save(&file)))
             && let Some((film, number)) = number
         {
             film.written(number);

@@ -32,7 +32,7 @@
  * others phantom_latest_tick, phantom_read_frame and phantom_is_attached may be called there; phantom_attach,
  * phantom_detach, phantom_publish and phantom_sleep_for_frame may not.
  *
- * A path is never empty: every function that takes one fails then.
+ * A path is neither NULL nor empty: every function that takes one fails then. A name that is NULL is an empty one.
  */
 #ifndef PHANTOM3_CLIENT_H
 #define PHANTOM3_CLIENT_H
@@ -69,7 +69,7 @@
 #define PHANTOM_ANSWER_TIMEOUT_S 2
 /* How many symbolic links a path may lead through; the kernel's own bound. */
 #define PHANTOM_MAX_LINKS 40
-/* Room for what a symbolic link leads to. More than a socket's address has: the next link may lead to a short name. */
+/* Room for a path and for what a symbolic link leads to. More than a socket's address has: the next link may lead to a short name. */
 #define PHANTOM_PATH_BYTES 1024
 
 /* What an application holds of the driver. */
@@ -183,10 +183,10 @@ static inline void phantom_sleep_for_frame(const PhantomAttachment *driver, uint
     __atomic_store_n(&own->bell.owner_sleeps, 0, __ATOMIC_RELAXED);
 }
 
-/* Whether the driver still lives; never blocks. */
+/* Whether it is attached and the driver still lives; never blocks. */
 static inline int phantom_is_attached(const PhantomAttachment *driver) {
     struct pollfd fd = {driver->connection, POLLRDHUP, 0};
-    return poll(&fd, 1, 0) <= 0;
+    return driver->segment && poll(&fd, 1, 0) <= 0;
 }
 
 /* Ends the lease and unmaps. */
@@ -209,8 +209,8 @@ static inline PhantomRequest phantom_request(uint64_t kind, const char *name) {
     struct timespec now;
     clock_gettime(CLOCK_MONOTONIC, &now);
     request.asked_ns = (uint64_t)now.tv_sec * 1000000000u + (uint64_t)now.tv_nsec;
-    size_t length = strlen(name);
-    memcpy(request.name, name, length < PHANTOM_NAME_BYTES ? length : PHANTOM_NAME_BYTES);
+    size_t length = name ? strlen(name) : 0;
+    if (length > 0) memcpy(request.name, name, length < PHANTOM_NAME_BYTES ? length : PHANTOM_NAME_BYTES);
     return request;
 }
 
@@ -385,10 +385,10 @@ static inline int phantom_is_granted(const PhantomRequest *request, const Phanto
     return 0;
 }
 
-/* Address of a name with `suffix` behind it. Its length; 0: the name is empty or too long. An empty one would be the
+/* Address of a name with `suffix` behind it. Its length; 0: there is none, or it is empty or too long. An empty one would be the
  * abstract address of whoever has taken that. */
 static inline socklen_t phantom_address(const char *path, const char *suffix, struct sockaddr_un *address) {
-    size_t length = strlen(path), more = strlen(suffix);
+    size_t length = path ? strlen(path) : 0, more = strlen(suffix);
     memset(address, 0, sizeof *address);
     address->sun_family = AF_UNIX;
     if (length == 0 || length + more >= sizeof address->sun_path) return 0;
@@ -403,7 +403,7 @@ static inline int phantom_connect(const char *path, char *error) {
     struct timeval timeout = {PHANTOM_ANSWER_TIMEOUT_S, 0};
     socklen_t length = phantom_address(path, "", &address);
     if (length == 0) {
-        if (*path == 0) phantom_say(error, "the path of the driver's socket is empty; name the socket");
+        if (!path || *path == 0) phantom_say(error, "the path of the driver's socket is empty; name the socket");
         else
             phantom_say(error, "the socket's name is longer than %llu bytes; choose a shorter one",
                         (unsigned long long)(sizeof address.sun_path - 1));
@@ -614,16 +614,15 @@ static inline size_t phantom_directory_bytes(const char *path) {
     return slash ? (size_t)(slash - path) + 1 : 0;
 }
 
-/* Sends a datagram to the stop socket beside a path that no address has room for, by way of its directory. `path` is
- * changed meanwhile. As phantom_send_stop_to. */
-static inline int phantom_send_stop_beside_far(char *path) {
+/* Sends a datagram to the stop socket beside a path that no address has room for, by way of its directory. As
+ * phantom_send_stop_to. */
+static inline int phantom_send_stop_beside_far(const char *path) {
     struct sockaddr_un address;
-    char place[sizeof address.sun_path] = "/proc/self/fd/";
+    char place[sizeof address.sun_path] = "/proc/self/fd/", above[PHANTOM_PATH_BYTES] = "";
     size_t used = strlen(place), bytes = phantom_directory_bytes(path), length = strlen(path + bytes);
-    if (bytes == 0) return -1;
-    path[bytes - 1] = 0;
-    int directory = open(bytes > 1 ? path : "/", O_PATH | O_DIRECTORY | O_CLOEXEC);
-    path[bytes - 1] = '/';
+    if (bytes == 0 || bytes >= sizeof above) return -1;
+    memcpy(above, path, bytes);
+    int directory = open(above, O_PATH | O_DIRECTORY | O_CLOEXEC);
     if (directory < 0) return -1;
     phantom_put_number(place, &used, (uint64_t)directory, 10, 1);
     place[used++] = '/';
@@ -637,45 +636,48 @@ static inline int phantom_send_stop_beside_far(char *path) {
     return sent;
 }
 
-/* Replaces a path by what the symbolic link of that name leads to. 0: it is none, or leads to more than there is room for.
- * Links of directories may stay: what lies beside a socket is found through them. */
+/* Sends a datagram to the stop socket beside a path. As phantom_send_stop_to. */
+static inline int phantom_send_stop_beside(const char *path) {
+    struct sockaddr_un address;
+    socklen_t length = phantom_address(path, ".stop", &address);
+    return length > 0 ? phantom_send_stop_to(&address, length) : phantom_send_stop_beside_far(path);
+}
+
+/* Replaces a path by what the symbolic link of that name leads to. 1: done; 0: it is none; -1: it leads to more than there
+ * is room for. Links of directories may stay: what lies beside a socket is found through them. */
 static inline int phantom_follow(char path[PHANTOM_PATH_BYTES]) {
     char target[PHANTOM_PATH_BYTES];
     ssize_t length = readlink(path, target, sizeof target);
     if (length <= 0) return 0;
     size_t kept = target[0] == '/' ? 0 : phantom_directory_bytes(path);
-    if (kept + (size_t)length >= PHANTOM_PATH_BYTES) return 0;
+    if (kept + (size_t)length >= PHANTOM_PATH_BYTES) return -1;
     memcpy(path + kept, target, (size_t)length);
     path[kept + (size_t)length] = 0;
     return 1;
 }
 
-/* Sends a datagram to the stop socket beside what the symbolic link `link` leads to. As phantom_send_stop_to; -1 also if it
- * is no link. */
+/* Sends a datagram to the stop socket beside a path and, where that is a symbolic link, beside what it leads to, which
+ * counts for more. As phantom_send_stop_to; -1 also where a link cannot be followed to its end. */
 static inline int phantom_send_stop_through(const char *link) {
-    struct sockaddr_un address;
     char path[PHANTOM_PATH_BYTES];
-    int links = 0;
+    int sent = phantom_send_stop_beside(link), links = 0, more = 1;
     if (strlen(link) >= sizeof path) return -1;
     memcpy(path, link, strlen(link) + 1);
-    while (links < PHANTOM_MAX_LINKS && phantom_follow(path)) links++;
-    if (links == 0) return -1;
-    socklen_t length = phantom_address(path, ".stop", &address);
-    return length > 0 ? phantom_send_stop_to(&address, length) : phantom_send_stop_beside_far(path);
+    while (links <= PHANTOM_MAX_LINKS && (more = phantom_follow(path)) > 0) links++;
+    if (more != 0) return -1;
+    int sent_through = links > 0 ? phantom_send_stop_beside(path) : -1;
+    return sent_through >= 0 ? sent_through : sent;
 }
 
 /* Sends a datagram to the driver's stop socket, which lies beside its own: whatever comes there stops the motors, and
  * no connection is needed for it. Where `path` is a link, then also to what lies beside its target, which counts for more.
  * Never waits; for signal handlers, too. 0: it is on its way; 1: the queue is full of stops, perhaps of others only; -1:
- * nobody is there, or the path is empty. */
+ * nobody is there, there is no path, or it or what it leads to has 1024 bytes or more. */
 static inline int phantom_send_stop(const char *path) {
-    struct sockaddr_un address;
     const int errno_before = errno;
-    socklen_t length = phantom_address(path, ".stop", &address);
-    int sent = length > 0 ? phantom_send_stop_to(&address, length) : -1;
-    int sent_through = phantom_send_stop_through(path);
+    int sent = path && *path ? phantom_send_stop_through(path) : -1;
     errno = errno_before;
-    return sent_through >= 0 ? sent_through : sent;
+    return sent;
 }
 
 /* Asks the driver to switch all motors off at once; they stay off until phantom_clear_fault. By datagram, which a driver

@@ -73,7 +73,20 @@ static int send_stop(const char *socket) {
     return errno == ERANGE ? 0 : 3;
 }
 
+/* What getenv gives of a variable that is not set, and an attachment that never was one. */
+static int nothing(void) {
+    PhantomAttachment driver;
+    char error[PHANTOM_ERROR_BYTES];
+    if (phantom_send_stop(NULL) != -1 || phantom_emergency_stop(NULL, NULL, error) != -1) return 3;
+    if (phantom_attach(NULL, PHANTOM_REQUEST_KIND_OBSERVE, NULL, &driver, error) != -1) return 3;
+    fprintf(stderr, "%s\n", error);
+    if (phantom_is_attached(&driver)) return 4;
+    memset(&driver, 0, sizeof driver);
+    return phantom_is_attached(&driver) ? 4 : 0;
+}
+
 int main(int argc, char **argv) {
+    if (argc == 2 && !strcmp(argv[1], "nothing")) return nothing();
     if (argc < 3) return 2;
     if (!strcmp(argv[2], "send-stop")) return send_stop(argv[1]);
     if (argc > 3 && !strcmp(argv[2], "ask")) return ask(argv[1], argv[3]);
@@ -108,5 +121,5 @@ int main(int argc, char **argv) {
     }
     printf("%llu ticks whole\n", (unsigned long long)ticks);
     phantom_detach(&driver);
-    return 0;
+    return phantom_is_attached(&driver) ? 4 : 0;
 }

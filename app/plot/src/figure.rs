@@ -66,7 +66,8 @@ impl Figure {
     /// # Errors
     /// If one cannot be made or written; the message names the file.
     pub fn write(&self, stem: &Path) -> Result<(), PlotError> {
-        output::write(self, stem)
+        self.write_svg(stem)?;
+        self.write_png(stem)
     }
 
     /// Writes `stem.svg` alone.
@@ -75,6 +76,14 @@ impl Figure {
     /// If it cannot be made or written; the message names the file.
     pub fn write_svg(&self, stem: &Path) -> Result<(), PlotError> {
         output::write_svg(self, stem)
+    }
+
+    /// Writes `stem.png` alone.
+    ///
+    /// # Errors
+    /// If it cannot be made or written; the message names the file.
+    pub fn write_png(&self, stem: &Path) -> Result<(), PlotError> {
+        output::write_png(self, stem)
     }
 
     /// Width and height (px), unscaled.

@@ -24,4 +24,4 @@ mod ticks;
 pub use axis::{Axis, Scale};
 pub use chart::{Chart, Look, Series};
 pub use figure::Figure;
-pub use output::PlotError;
+pub use output::{PlotError, is_drawn_here};

@@ -5,12 +5,17 @@ use crate::figure::Figure;
 use crate::font;
 use plotters::prelude::{BitMapBackend, DrawingBackend, IntoDrawingArea, SVGBackend};
 use rt_core::replacement;
-use std::io;
+use std::fs::File;
+use std::io::{self, Read};
 use std::path::{Path, PathBuf};
 use thiserror::Error;
 
 /// Pixels of a PNG for each unit of the description.
 const PNG_SCALE: f64 = 2.0;
+/// What is told in a picture of who made it.
+const MARK: &str = "drawn by phantom3";
+/// It is among the first so many bytes.
+const MARKED_BYTES: u64 = 512;
 /// A larger picture is a mistake: half a gigabyte of pixels.
 const MOST_PIXELS: u64 = 1 << 27;
 
@@ -48,7 +53,20 @@ pub(crate) fn svg(figure: &Figure) -> Result<String, PlotError> {
     let mut text = String::new();
     render(figure, SVGBackend::with_string(&mut text, figure.size()), 1.0)?;
     let ours = format!("font-family=\"{}\"", font::FAMILY);
-    Ok(text.replace(&ours, &format!("font-family=\"{}\"", font::SVG_FAMILIES)))
+    let text = text.replace(&ours, &format!("font-family=\"{}\"", font::SVG_FAMILIES));
+    // Behind the first tag.
+    let (tag, rest) = text.split_once('>').unwrap_or((&text, ""));
+    Ok(format!("{tag}>\n<!-- {MARK} -->{rest}"))
+}
+
+/// True if this file is a picture that [`svg`] or [`png`] made.
+///
+/// # Errors
+/// If it cannot be read.
+pub fn is_drawn_here(file: &Path) -> io::Result<bool> {
+    let mut first = Vec::new();
+    File::open(file)?.take(MARKED_BYTES).read_to_end(&mut first)?;
+    Ok(first.windows(MARK.len()).any(|bytes| bytes == MARK.as_bytes()))
 }
 
 pub(crate) fn png(figure: &Figure) -> Result<Vec<u8>, PlotError> {
@@ -64,12 +82,12 @@ pub(crate) fn png(figure: &Figure) -> Result<Vec<u8>, PlotError> {
     let mut encoder = png::Encoder::new(&mut bytes, width, height);
     encoder.set_color(png::ColorType::Rgb);
     encoder.set_depth(png::BitDepth::Eight);
+    encoder.add_text_chunk("Software".into(), MARK.into())?;
     encoder.write_header()?.write_image_data(&pixels)?;
     Ok(bytes)
 }
 
-pub(crate) fn write(figure: &Figure, stem: &Path) -> Result<(), PlotError> {
-    write_svg(figure, stem)?;
+pub(crate) fn write_png(figure: &Figure, stem: &Path) -> Result<(), PlotError> {
     write_file(stem, ".png", &figure.png()?)
 }
 

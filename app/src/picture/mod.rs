@@ -51,7 +51,7 @@ pub struct PlotArgs {
     #[arg(long)]
     svg_only: bool,
     /// Where: OUT.svg and OUT.png, called as the recording in OUT/; with --by-entity a directory for ENTITY.svg and
-    /// ENTITY.png. What is there is replaced, and told; inputs are not
+    /// ENTITY.png. Earlier charts are replaced, and told; other files are not
     /// [default: the recording's name without its ending; with --objects and -objects behind it]
     #[arg(long, value_name = "OUT")]
     out: Option<PathBuf>,
@@ -98,10 +98,6 @@ fn draw(
 ) -> Result<(), RunFailure> {
     let wrong = |error: &dyn std::fmt::Display| RunFailure::Start(error.to_string());
     let finger = |recorded: &Recorded| recorded.choose(args.finger.as_deref()).map_err(|error| wrong(&error));
-    let all: Vec<&Recorded> = [recorded].into_iter().chain(against).collect();
-    if !args.by_entity {
-        check_read(out, args.svg_only, &all)?;
-    }
     if args.objects {
         let others = against.map(|against| (against, &*against.bodies));
         let bodies = recorded.moving().map_err(|error| wrong(&error))?;
@@ -133,7 +129,6 @@ fn draw(
     let stems: Vec<PathBuf> = file_stems(&felt).into_iter().map(|stem| out.join(stem)).collect();
     let inputs: Vec<&PathBuf> = [&args.recording].into_iter().chain(&args.against).collect();
     stems.iter().try_for_each(|stem| check_files(stem, args.svg_only, &inputs))?;
-    stems.iter().try_for_each(|stem| check_read(stem, args.svg_only, &all))?;
     for (visit, stem) in felt.iter().zip(stems) {
         let other = felt_against.iter().find(|other| other.entity == visit.entity);
         let other = against.map(Recorded::label).zip(other);
@@ -197,25 +192,32 @@ fn files_of(stem: &Path, svg_only: bool) -> Vec<PathBuf> {
     endings.iter().map(|ending| with_end(stem, ending)).collect()
 }
 
-/// No picture takes the place of one that the recorded run read, which is known by its content.
-fn check_read(stem: &Path, svg_only: bool, recorded: &[&Recorded]) -> Result<(), RunFailure> {
-    for file in files_of(stem, svg_only) {
-        if let Some(recording) = recorded.iter().find_map(|recorded| recorded.has_read(&file)) {
-            return Err(RunFailure::Start(format!(
-                "the picture {} would overwrite an input of the run that is recorded in {}; name another place with --out",
-                Plain(file.display()),
-                Plain(recording.display())
-            )));
-        }
-    }
-    Ok(())
-}
-
-/// No picture takes the place of a recording.
+/// No picture takes the place of a recording, nor of anything else but an earlier chart: it may be an input of a run.
 fn check_files(stem: &Path, svg_only: bool, inputs: &[&PathBuf]) -> Result<(), RunFailure> {
     let files = files_of(stem, svg_only);
     let outputs: Vec<_> = files.iter().map(|file| Output::chart(file)).collect();
-    outputs::check(&outputs, inputs)
+    outputs::check(&outputs, inputs)?;
+    files.iter().try_for_each(|file| refuse_others(file))
+}
+
+fn refuse_others(file: &Path) -> Result<(), RunFailure> {
+    let Ok(found) = file.metadata() else { return Ok(()) };
+    let what = if found.is_dir() {
+        "a directory"
+    } else if is_earlier(file) && !plot::is_drawn_here(file).unwrap_or(false) {
+        "a file that is no chart of this program"
+    } else {
+        return Ok(());
+    };
+    Err(RunFailure::Start(format!(
+        "the picture {} would take the place of {what}; name another place with --out",
+        Plain(file.display())
+    )))
+}
+
+/// True of a file that has a content.
+fn is_earlier(file: &Path) -> bool {
+    file.metadata().is_ok_and(|found| found.is_file() && found.len() > 0)
 }
 
 /// Before the work, not after it.
@@ -231,18 +233,15 @@ fn check_place(stem: &Path) -> Result<(), RunFailure> {
 
 fn write(figure: &Figure, stem: &Path, svg_only: bool) -> Result<(), RunFailure> {
     let late = |error: PlotError| RunFailure::Results(error.to_string());
-    let is_earlier = |file: &PathBuf| file.metadata().is_ok_and(|found| found.is_file() && found.len() > 0);
-    let replaced: Vec<PathBuf> = files_of(stem, svg_only).into_iter().filter(is_earlier).collect();
-    let written = if svg_only {
-        figure.write_svg(stem).map_err(late)?;
-        ".svg"
-    } else {
-        figure.write(stem).map_err(late)?;
-        ".svg, .png"
-    };
-    tell(&format_args!("written      {}{written}", Plain(stem.display())), false);
-    for file in replaced {
+    let files = files_of(stem, svg_only);
+    let was_there: Vec<bool> = files.iter().map(|file| is_earlier(file)).collect();
+    let mut endings = ".svg";
+    figure.write_svg(stem).map_err(late)?;
+    let whole = if svg_only { Ok(()) } else { figure.write_png(stem).map(|()| endings = ".svg, .png") };
+    tell(&format_args!("written      {}{endings}", Plain(stem.display())), false);
+    let written = if whole.is_ok() { files.len() } else { 1 };
+    for (file, _) in files.iter().zip(was_there).take(written).filter(|(_, was_there)| *was_there) {
         tell(&format_args!("replaced     {}", Plain(file.display())), false);
     }
-    Ok(())
+    whole.map_err(late)
 }

@@ -20,8 +20,6 @@ pub(super) struct Recorded {
     pub(super) times_s: Vec<f64>,
     pub(super) fingers: Vec<RecordedFinger>,
     pub(super) bodies: Vec<RecordedBody>,
-    /// Contents of the pictures that the run read.
-    pictures: Vec<Vec<u8>>,
     /// Why nothing is read behind the last of these rows, if something is wrong there.
     damage: Option<Damage>,
 }
@@ -130,23 +128,12 @@ impl Recorded {
                 }
             }
         }
-        let pictures = table.pictures();
-        Ok(Self { file: file.into(), times_s, fingers, bodies, pictures, damage })
+        Ok(Self { file: file.into(), times_s, fingers, bodies, damage })
     }
 
     /// The fault that damage behind its rows is.
     pub(super) fn damage(&self) -> Option<RunFailure> {
         self.damage.as_ref().map(|found| damaged(&found.why, found.rows, found.until_s))
-    }
-
-    /// The recording, if this file is a picture that its run read.
-    pub(super) fn has_read(&self, file: &Path) -> Option<&Path> {
-        let is_it = |content: &[u8]| {
-            let is_as_long =
-                file.metadata().is_ok_and(|found| found.is_file() && found.len() == content.len() as u64);
-            is_as_long && std::fs::read(file).is_ok_and(|found| found == content)
-        };
-        self.pictures.iter().any(|content| is_it(content)).then_some(&self.file)
     }
 
     /// What a legend calls it: the file's name without folders and ending.

@@ -68,18 +68,6 @@ impl Table {
         &self.columns
     }
 
-    /// Contents of the pictures that its run read, if its format has them.
-    pub(super) fn pictures(&self) -> Vec<Vec<u8>> {
-        let Rows::Run(run) = &self.rows else { return Vec::new() };
-        let is_picture = |name: &str| {
-            // The name may be the end of a list in JSON.
-            let name = name.trim_end_matches(['"', ']']).to_ascii_lowercase();
-            name.ends_with(".png") || name.ends_with(".svg")
-        };
-        let files = run.about().into_iter().flat_map(|about| &about.files);
-        files.filter(|file| is_picture(&file.name)).map(|file| file.bytes.clone()).collect()
-    }
-
     /// The next row; `None` behind the last.
     pub(super) fn next_row(&mut self) -> Result<Option<TableRow>, RecordedError> {
         let cells = match &mut self.rows {

@@ -94,8 +94,8 @@ impl Files {
         let inputs = rig.input_files();
         let taken: Vec<&PathBuf> =
             self.taken.iter().chain(&self.record).chain(&self.events).chain(&inputs).collect();
-        let path = free_place(first, number, &taken);
-        let (names, file) = (rig.names(&self.extras), Opened::recording(&path)?);
+        let (path, file) = open_free_place(first, number, &taken)?;
+        let names = rig.names(&self.extras);
         let file = create(file, names, self.period_ns, &about, view, (&self.book, number))?;
         self.taken.push(path.clone());
         self.start(&path, file, rig)
@@ -123,24 +123,34 @@ impl Files {
     }
 }
 
-/// For the second scene `out.2.mcap`, for the next `out.3.mcap`; or the first number behind it that is not taken, and that only a
-/// recording has by that one name: nobody has named the file.
-fn free_place(first: &Path, scene: u32, taken: &[&PathBuf]) -> PathBuf {
+/// File for the second scene `out.2.mcap`, for the next `out.3.mcap`; or of the first number behind it that is not taken, that only
+/// a recording has by that one name, and that nobody else writes: nobody has named the file.
+///
+/// # Errors
+/// If the system refuses.
+fn open_free_place(
+    first: &Path,
+    scene: u32,
+    taken: &[&PathBuf],
+) -> Result<(PathBuf, Opened), RecordingError> {
     let mut number = scene + 1;
     loop {
         let place = numbered(first, number);
         let is_taken = taken.iter().any(|other| is_same_place(&place, other));
         if !is_taken && Stream::that_is(&place).is_none() && !is_of_others(&place) {
-            return place;
+            match Opened::recording(&place) {
+                Err(RecordingError::Claimed { .. }) => {}
+                opened => return opened.map(|file| (place, file)),
+            }
         }
         number += 1;
     }
 }
 
-/// A link, a file of several names, or one that begins as no recording does.
+/// True of a link, a file of several names, one that begins as no recording does, and what is no file: a directory, a pipe.
 fn is_of_others(place: &Path) -> bool {
     let Ok(found) = place.symlink_metadata() else { return false };
-    found.is_symlink() || found.is_file() && (found.nlink() > 1 || !begins_as_recording(place, found.len()))
+    !found.is_file() || found.nlink() > 1 || !begins_as_recording(place, found.len())
 }
 
 /// As a table or MCAP, an earlier one that was being replaced when a process was killed, or a file that was made and not begun.
@@ -180,22 +190,28 @@ mod tests {
         assert!(!is_table(b"t,f0_x,f0_y,f0_z") && !is_table(b"t,reaction_ms") && !is_table(b"t"));
     }
 
+    fn free_place(first: &Path, scene: u32, taken: &[&PathBuf]) -> PathBuf {
+        open_free_place(first, scene, taken).expect("a file").0
+    }
+
     #[test]
     fn the_second_scene_is_recorded_beside_the_first() {
-        let place = |path: &str, scene| free_place(Path::new(path), scene, &[]).display().to_string();
+        let place = |path: &str, scene: u32| numbered(Path::new(path), scene + 1).display().to_string();
         assert_eq!([place("a/out.mcap", 1), place("a/out.mcap", 2)], ["a/out.2.mcap", "a/out.3.mcap"]);
         assert_eq!([place("out", 2), place("o.b.csv", 1)], ["out.3", "o.b.2.csv"]);
     }
 
     #[test]
     fn a_number_whose_file_is_taken_is_passed_over() {
-        let taken = ["./w.2.csv", "w.3.csv"].map(PathBuf::from);
-        let place = free_place(Path::new("w.csv"), 1, &taken.iter().collect::<Vec<_>>());
-        assert_eq!(place, Path::new("w.4.csv"));
+        let directory = tempfile::tempdir().expect("a directory");
+        let file = |name: &str| directory.path().join(name);
+        let taken = [file("./w.2.csv"), file("w.3.csv")];
+        let place = free_place(&file("w.csv"), 1, &taken.iter().collect::<Vec<_>>());
+        assert_eq!(place, file("w.4.csv"));
     }
 
     #[test]
-    fn only_an_earlier_recording_that_has_no_other_name_is_written_over() {
+    fn only_an_earlier_recording_that_has_no_other_name_and_that_nobody_writes_is_written_over() {
         let directory = tempfile::tempdir().expect("a directory");
         let file = |name: &str| directory.path().join(name);
         let first = file("w.csv");
@@ -204,10 +220,14 @@ mod tests {
         std::fs::hard_link(file("precious.csv"), file("w.3.csv")).expect("a link");
         std::os::unix::fs::symlink(file("nowhere"), file("w.4.csv")).expect("a link");
         std::fs::write(file("w.5.csv"), "trial,answer\n1,yes\n").expect("room");
-        assert_eq!(free_place(&first, 1, &[]), file("w.6.csv"));
+        std::fs::create_dir(file("w.6.csv")).expect("a directory");
+        let (kind, mode) = (rustix::fs::FileType::Fifo, rustix::fs::Mode::RUSR);
+        rustix::fs::mknodat(rustix::fs::CWD, file("w.7.csv"), kind, mode, 0).expect("a pipe");
+        let _other_run = Opened::recording(&file("w.8.csv")).expect("a file");
+        assert_eq!(free_place(&first, 1, &[]), file("w.9.csv"));
         for recording in [&b"t,f0_hip_x,f0_hip_y\n0,1,2\n"[..], b"\x89MCAP0\r\nrest", b"\0half", b""] {
-            std::fs::write(file("w.6.csv"), recording).expect("room");
-            assert_eq!(free_place(&first, 1, &[]), file("w.6.csv"), "a rerun writes the same files again");
+            std::fs::write(file("w.9.csv"), recording).expect("room");
+            assert_eq!(free_place(&first, 1, &[]), file("w.9.csv"), "a rerun writes the same files again");
         }
     }
 }

@@ -3,12 +3,14 @@
 //! Problem: pictures that are left out, or cannot be written, would leave those of an earlier film among the new ones.
 //! Model: the directory is claimed (flock(2)) while the run goes on. Numbers are settled in their order: one without a picture
 //! loses the earlier film's when the next one is written, those behind the last one at the end ([`FilmFiles::settle`]).
+//! A directory that is renamed meanwhile gets no more pictures, nor does the one in its place, which nobody has claimed.
 //! Invariants: of a film without a single picture nothing is removed; what is removed is called as a picture of the film to the
 //! letter, and is a file or a link, which is not followed.
 
 use super::Film;
 use std::ffi::OsStr;
 use std::fs::{File, TryLockError};
+use std::io;
 use std::os::unix::fs::MetadataExt;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -36,6 +38,7 @@ pub(super) fn claim(directory: &Path) -> Result<Option<File>, String> {
 #[derive(Debug, Clone)]
 pub(super) struct FilmFiles {
     directory: PathBuf,
+    claim: Option<Arc<File>>,
     /// The number behind the last picture that was written; 0: there is none.
     settled: Arc<AtomicU64>,
     /// Pictures of another film that cannot be removed.
@@ -43,13 +46,19 @@ pub(super) struct FilmFiles {
 }
 
 impl FilmFiles {
-    pub(super) fn of(film: &Film) -> Self {
-        Self { directory: film.directory.clone(), settled: Arc::default(), stuck: Arc::default() }
+    /// In the film's directory, claimed by this.
+    pub(super) fn of(film: &Film, claim: Option<File>) -> Self {
+        let (directory, claim) = (film.directory.clone(), claim.map(Arc::new));
+        Self { directory, claim, settled: Arc::default(), stuck: Arc::default() }
     }
 
-    /// Place of the picture of this number. A link there, or one of several names of a file, is that no more: a film has
-    /// files of its own, and what it led to may be what is drawn.
-    pub(super) fn place(&self, number: u64) -> PathBuf {
+    /// Readies the place of the picture of this number. A link there, or one of several names of a file, is that no more: a film
+    /// has files of its own, and what it led to may be what is drawn.
+    ///
+    /// # Errors
+    /// If the directory's name leads to another one by now, or to none.
+    pub(super) fn ready(&self, number: u64) -> io::Result<()> {
+        self.check_directory()?;
         let file = self.name(number);
         if let Ok(found) = std::fs::symlink_metadata(&file)
             && (found.is_symlink() || found.is_file() && found.nlink() > 1)
@@ -57,7 +66,16 @@ impl FilmFiles {
             // Whoever may not do that is told when the picture cannot be written.
             let _ = std::fs::remove_file(&file);
         }
-        file
+        Ok(())
+    }
+
+    fn check_directory(&self) -> io::Result<()> {
+        let Some(claim) = &self.claim else { return Ok(()) };
+        let [claimed, found] = [claim.metadata()?, self.directory.metadata()?];
+        if (claimed.dev(), claimed.ino()) == (found.dev(), found.ino()) {
+            return Ok(());
+        }
+        Err(io::Error::other("the directory's name leads to another one by now"))
     }
 
     /// The picture of this number is written.
@@ -68,7 +86,7 @@ impl FilmFiles {
 
     /// The film is over: so many pictures were due.
     pub(super) fn settle(&self, due: u64) {
-        if self.settled.load(Ordering::Relaxed) > 0 {
+        if self.settled.load(Ordering::Relaxed) > 0 && self.check_directory().is_ok() {
             self.remove_before(due);
             self.settled.fetch_max(due, Ordering::Relaxed);
         }
@@ -103,7 +121,8 @@ impl FilmFiles {
         entries.flatten().filter(|entry| is_older(&entry.file_name())).count()
     }
 
-    fn name(&self, number: u64) -> PathBuf {
+    /// Place of the picture of this number.
+    pub(super) fn name(&self, number: u64) -> PathBuf {
         self.directory.join(format!("frame-{number:06}.png"))
     }
 }
@@ -117,7 +136,7 @@ mod tests {
         let place = tempfile::tempdir().expect("a directory");
         let directory = place.path().join("film");
         let film = Film { directory: directory.clone(), fps: 10.0 };
-        let _claim = claim(&directory).expect("nobody has it");
+        let claimed = claim(&directory).expect("nobody has it");
         let name = |number: u64| directory.join(format!("frame-{number:06}.png"));
         let mine = place.path().join("mine");
         std::fs::write(&mine, "mine").expect("room");
@@ -130,11 +149,12 @@ mod tests {
         }
         std::fs::write(directory.join("frame-2.png"), "another's").expect("room");
 
-        let files = FilmFiles::of(&film);
+        let files = FilmFiles::of(&film, claimed);
         files.settle(3);
         assert_eq!((files.older(), name(0).exists()), (9, true), "a film without a picture replaces none");
         for number in [1, 3] {
-            std::fs::write(files.place(number), "new").expect("room");
+            files.ready(number).expect("it is there");
+            std::fs::write(name(number), "new").expect("room");
             files.written(number);
         }
         assert!(name(5).exists(), "its picture may still come");
@@ -144,6 +164,27 @@ mod tests {
         assert_eq!((files.older(), files.stuck()), (2, 0));
         assert_eq!(std::fs::read_to_string(&mine).expect("there"), "mine");
         assert!(directory.join("frame-2.png").exists(), "it is not called as a picture of the film");
+    }
+
+    #[test]
+    fn a_directory_that_is_renamed_or_replaced_gets_no_more_pictures() {
+        let place = tempfile::tempdir().expect("a directory");
+        let [directory, other] = ["film", "moved"].map(|name| place.path().join(name));
+        let film = Film { directory: directory.clone(), fps: 10.0 };
+        let files = FilmFiles::of(&film, claim(&directory).expect("nobody has it"));
+        files.ready(0).expect("it is there");
+        files.written(0);
+        std::fs::rename(&directory, &other).expect("our own");
+        assert_eq!(files.ready(1).expect_err("gone").kind(), io::ErrorKind::NotFound);
+        std::fs::create_dir(&directory).expect("room");
+        std::fs::write(files.name(1), "another's").expect("room");
+        files.ready(1).expect_err("another one");
+        files.settle(2);
+        assert!(files.name(1).exists(), "it is another's");
+        std::fs::remove_dir_all(&directory)
+            .and_then(|()| std::fs::rename(&other, &directory))
+            .expect("our own");
+        files.ready(1).expect("it is back");
     }
 
     #[test]

@@ -300,6 +300,43 @@ fn a_stop_of_a_c_program_goes_through_every_kind_of_link() {
     for place in ["round", "dangling", "nobody", "b", "b/", "/"] {
         assert_eq!(send(Path::new(place)), ("-1\n".into(), false), "{place}");
     }
+    // Names that no address has room for, of the socket itself and of a link.
+    let deep = "deep/".repeat(30);
+    for place in [format!("{deep}../"), format!("{}/{deep}", directory.path().display())] {
+        let up = if place.ends_with("../") { 29 } else { 30 };
+        let place = format!("{place}{}", "../".repeat(up));
+        for name in ["a/driver.sock", "relative"] {
+            let place = format!("{place}{name}");
+            assert!(place.len() > 107);
+            assert_eq!(send(Path::new(&place)), ("0\n".into(), true), "{place}");
+        }
+    }
+}
+
+#[test]
+fn a_stop_of_a_c_program_that_a_stranger_hears_alone_is_not_told_as_sent() {
+    let Some(program) = compiled() else { return };
+    let directory = tempfile::tempdir().unwrap();
+    let targets = [format!("{}driver.sock", "./".repeat(600)), "link1".into()];
+    for (number, target) in targets.iter().enumerate() {
+        let link = directory.path().join(format!("link{number}"));
+        std::os::unix::fs::symlink(target, &link).unwrap();
+        let stranger = stops_beside(&link);
+        let output =
+            std::process::Command::new(program).arg(&link).arg("send-stop").bounded_output().unwrap();
+        assert_eq!(String::from_utf8(output.stdout).unwrap(), "-1\n", "{}", link.display());
+        assert!(stranger.recv(&mut [0; 16]).is_ok(), "it may be the driver's as well");
+    }
+}
+
+#[test]
+fn a_c_program_without_a_path_asks_nobody_and_is_not_attached() {
+    let Some(program) = compiled() else { return };
+    let output = std::process::Command::new(program).arg("nothing").bounded_output().unwrap();
+    assert_eq!(
+        (output.status.code(), String::from_utf8_lossy(&output.stderr).as_ref()),
+        (Some(0), "the path of the driver's socket is empty; name the socket\n")
+    );
 }
 
 /// An address of all the room there is, empty, is an abstract one, and `.stop` a file of whoever owns the directory.

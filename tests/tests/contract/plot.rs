@@ -159,7 +159,7 @@ fn pictures_of_entities_lie_in_their_directory_whatever_a_recording_calls_them()
 }
 
 #[test]
-fn a_picture_replaces_no_input_of_its_run_and_tells_what_it_replaces() {
+fn a_picture_replaces_earlier_charts_alone_and_tells_it() {
     let place = Workplace::new();
     recorded(&place, "lift", 0.5);
     // A height map that is called as the picture would be: 2 x 2, flat.
@@ -173,17 +173,25 @@ fn a_picture_replaces_no_input_of_its_run_and_tells_what_it_replaces() {
     let said =
         place.run(["run", "lift.toml", "--hand", "hand.csv", "--clock", "virtual", "--record", "lift.mcap"]);
     assert_eq!(said.status, Some(0), "{}", said.err);
-    let said = place.run(["plot", "lift.mcap"]);
-    assert_eq!(said.status, Some(2), "{}", said.err);
-    assert!(
-        said.err.contains(
-            "the picture lift.png would overwrite an input of the run that is recorded in lift.mcap"
+    assert_eq!(place.run(["export", "lift.mcap", "lift.csv"]).status, Some(0));
+    std::fs::create_dir(place.path("made.png")).expect("room");
+    for (arguments, says) in [
+        (
+            &["plot", "lift.mcap"][..],
+            "lift.png would take the place of a file that is no chart of this program",
         ),
-        "{}",
-        said.err
-    );
+        (&["plot", "lift.csv"], "lift.png would take the place of a file that is no chart of this program"),
+        (&["plot", "lift.csv", "--out", "made"], "made.png would take the place of a directory"),
+    ] {
+        let said = place.run(arguments);
+        assert_eq!(said.status, Some(2), "{arguments:?}: {}", said.err);
+        assert!(said.err.contains(says), "{arguments:?}: {}", said.err);
+    }
     assert_eq!(std::fs::read(place.path("lift.png")).expect("there"), heights);
-    assert!(!place.path("lift.svg").exists(), "nothing is written");
+    assert!(
+        !["lift.svg", "made.svg"].map(|file| place.path(file).exists()).contains(&true),
+        "nothing is written"
+    );
 
     let first = place.run(["plot", "lift.mcap", "--out", "felt"]);
     assert_eq!(
