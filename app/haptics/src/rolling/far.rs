@@ -30,7 +30,10 @@ impl<F: Foot> Ball<F> {
         }
         let near_m = tolerance_m(ground, self.radius_m);
         let slid = |share: f64| {
-            let ball = self.rolled_to(ground, &(self.centre_B + way_B * share));
+            let target_B = self.centre_B + way_B * share;
+            let ball = self.rolled_to(ground, &target_B);
+            // Where a face ends it is brought back by any length, onto the same planes.
+            let is_there = (ball.centre_B - target_B).norm() <= SAME_WAY * share * way_m;
             let is_same = |(rest, before): (&Rest<F>, &Rest<F>)| {
                 rest.normal_B.cross(&before.normal_B).norm_squared() < SAME_PLANE * SAME_PLANE
                     && (rest.offset_m - before.offset_m).abs() <= near_m
@@ -38,7 +41,8 @@ impl<F: Foot> Ball<F> {
             // What presses nothing may be left behind.
             let [after, before] =
                 [&ball, self].map(|ball| ball.rests().iter().filter(|rest| rest.load_m > 0.0));
-            let slides = !ball.is_blocked
+            let slides = is_there
+                && !ball.is_blocked
                 && ball.held().count_ones() == self.held().count_ones()
                 && after.zip(before).all(is_same);
             slides.then_some(ball)
@@ -116,5 +120,7 @@ const LONG: f64 = 4.0;
 const MOST_SHORTENED: u32 = 3;
 /// The most times that it is halved to find where such a face ends.
 const MOST_HALVINGS: u32 = 12;
+/// Of a way, what bringing a ball back onto its planes may take away.
+const SAME_WAY: f64 = 1e-3;
 /// Sine of the angle below which planes are the same one.
 const SAME_PLANE: f64 = 1e-10;
