@@ -381,12 +381,13 @@ fn draw_all(
         drawn.renderer = studio.renderer().to_owned();
         let picture = studio.take(&moment, camera, eyes);
         steps.take();
-        let is_ready = number.map_or(Ok(()), |(film, number)| film.ready(number));
-        if drawn.note(&file, is_ready.and_then(|()| picture.save(&file)))
-            && let Some((film, number)) = number
-        {
-            film.written(number);
-        }
+        let saved = match number {
+            Some((film, number)) => {
+                film.ready(number).and_then(|()| picture.save(&file)).and_then(|()| film.written(number))
+            }
+            None => picture.save(&file),
+        };
+        drawn.note(&file, saved);
         written.store(drawn.written, Ordering::Relaxed);
         steps.take();
     }

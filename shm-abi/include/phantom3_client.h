@@ -27,8 +27,8 @@
  *
  * Signal handlers may call phantom_send_stop, which never waits, and phantom_emergency_stop, phantom_stop,
  * phantom_clear_fault, phantom_zero and phantom_end_lease, which wait for an answer for up to seven seconds. These call
- * nothing but what POSIX calls async-signal-safe: no allocation, no lock, no printf. They need 12 KiB of stack (4 KiB
- * where symbols are bound at the start, -Wl,-z,now: else the first call binds them), and leave errno as it is. Of the
+ * nothing but what POSIX calls async-signal-safe: no allocation, no lock, no printf. They need 12 KiB of stack, and on an
+ * alternate one no more than that and what the kernel takes of it (AT_MINSIGSTKSZ), and leave errno as it is. Of the
  * others phantom_latest_tick, phantom_read_frame and phantom_is_attached may be called there; phantom_attach,
  * phantom_detach, phantom_publish and phantom_sleep_for_frame may not.
  *
@@ -657,7 +657,7 @@ static inline int phantom_follow(char path[PHANTOM_PATH_BYTES]) {
 }
 
 /* Sends a datagram to the stop socket beside a path and, where that is a symbolic link, beside what it leads to, which
- * counts for more. As phantom_send_stop_to; -1 also where a link cannot be followed to its end. */
+ * alone counts then. As phantom_send_stop_to; -1 also where a link cannot be followed to its end. */
 static inline int phantom_send_stop_through(const char *link) {
     char path[PHANTOM_PATH_BYTES];
     int sent = phantom_send_stop_beside(link), links = 0, more = 1;
@@ -665,14 +665,14 @@ static inline int phantom_send_stop_through(const char *link) {
     memcpy(path, link, strlen(link) + 1);
     while (links <= PHANTOM_MAX_LINKS && (more = phantom_follow(path)) > 0) links++;
     if (more != 0) return -1;
-    int sent_through = links > 0 ? phantom_send_stop_beside(path) : -1;
-    return sent_through >= 0 ? sent_through : sent;
+    return links > 0 ? phantom_send_stop_beside(path) : sent;
 }
 
 /* Sends a datagram to the driver's stop socket, which lies beside its own: whatever comes there stops the motors, and
- * no connection is needed for it. Where `path` is a link, then also to what lies beside its target, which counts for more.
- * Never waits; for signal handlers, too. 0: it is on its way; 1: the queue is full of stops, perhaps of others only; -1:
- * nobody is there, there is no path, or it or what it leads to has 1024 bytes or more. */
+ * no connection is needed for it. Where `path` is a link, then also to what lies beside its target, which alone counts:
+ * beside the link may be a stranger. Never waits; for signal handlers, too. 0: it is on its way; 1: the queue is full of
+ * stops, perhaps of others only; -1: nobody is there, there is no path, it cannot be followed, or it or what it leads to is
+ * too long: 1024 bytes and more, or 103 and more of which the last name has more than 80. */
 static inline int phantom_send_stop(const char *path) {
     const int errno_before = errno;
     int sent = path && *path ? phantom_send_stop_through(path) : -1;

@@ -38,17 +38,17 @@ pub enum Sent {
 }
 
 /// Asks the driver at `socket` for an emergency stop; never waits. Where that is a symbolic link, the driver is asked at what it
-/// leads to as well: beside the link may be what a dead driver has left, or a stranger.
+/// leads to as well, which alone counts: beside the link may be what a dead driver has left, or a stranger.
 ///
 /// # Errors
 /// If there is no driver, or the kernel does not let us send. That it was sent does not say that it was done: a frame
 /// tells.
 pub fn send(socket: &Path) -> io::Result<Sent> {
     let sent = send_beside(socket);
-    match std::fs::canonicalize(socket) {
-        Ok(target) if target != socket => send_beside(&target).or(sent),
-        _ => sent,
+    if !socket.is_symlink() {
+        return sent;
     }
+    std::fs::canonicalize(socket).and_then(|target| send_beside(&target))
 }
 
 fn send_beside(socket: &Path) -> io::Result<Sent> {

@@ -13,8 +13,8 @@ use thiserror::Error;
 /// Pixels of a PNG for each unit of the description.
 const PNG_SCALE: f64 = 2.0;
 /// What is told in a picture of who made it.
-const MARK: &str = "drawn by phantom3";
-/// It is among the first so many bytes.
+const MADE_BY: &str = "drawn by phantom3";
+/// That is among the first so many bytes.
 const MARKED_BYTES: u64 = 512;
 /// A larger picture is a mistake: half a gigabyte of pixels.
 const MOST_PIXELS: u64 = 1 << 27;
@@ -56,7 +56,7 @@ pub(crate) fn svg(figure: &Figure) -> Result<String, PlotError> {
     let text = text.replace(&ours, &format!("font-family=\"{}\"", font::SVG_FAMILIES));
     // Behind the first tag.
     let (tag, rest) = text.split_once('>').unwrap_or((&text, ""));
-    Ok(format!("{tag}>\n<!-- {MARK} -->{rest}"))
+    Ok(format!("{tag}>\n<!-- {MADE_BY} -->{rest}"))
 }
 
 /// True if this file is a picture that [`svg`] or [`png`] made.
@@ -66,7 +66,8 @@ pub(crate) fn svg(figure: &Figure) -> Result<String, PlotError> {
 pub fn is_drawn_here(file: &Path) -> io::Result<bool> {
     let mut first = Vec::new();
     File::open(file)?.take(MARKED_BYTES).read_to_end(&mut first)?;
-    Ok(first.windows(MARK.len()).any(|bytes| bytes == MARK.as_bytes()))
+    let marks = [format!("<!-- {MADE_BY} -->"), format!("Software\0{MADE_BY}")];
+    Ok(marks.iter().any(|mark| first.windows(mark.len()).any(|bytes| bytes == mark.as_bytes())))
 }
 
 pub(crate) fn png(figure: &Figure) -> Result<Vec<u8>, PlotError> {
@@ -82,7 +83,7 @@ pub(crate) fn png(figure: &Figure) -> Result<Vec<u8>, PlotError> {
     let mut encoder = png::Encoder::new(&mut bytes, width, height);
     encoder.set_color(png::ColorType::Rgb);
     encoder.set_depth(png::BitDepth::Eight);
-    encoder.add_text_chunk("Software".into(), MARK.into())?;
+    encoder.add_text_chunk("Software".into(), MADE_BY.into())?;
     encoder.write_header()?.write_image_data(&pixels)?;
     Ok(bytes)
 }

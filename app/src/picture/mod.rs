@@ -205,7 +205,7 @@ fn refuse_others(file: &Path) -> Result<(), RunFailure> {
     let what = if found.is_dir() {
         "a directory"
     } else if is_earlier(file) && !plot::is_drawn_here(file).unwrap_or(false) {
-        "a file that is no chart of this program"
+        "a file that is not known as a chart of this program"
     } else {
         return Ok(());
     };

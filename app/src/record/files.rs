@@ -124,7 +124,7 @@ impl Files {
 }
 
 /// File for the second scene `out.2.mcap`, for the next `out.3.mcap`; or of the first number behind it that is not taken, that only
-/// a recording has by that one name, and that nobody else writes: nobody has named the file.
+/// a recording has by that one name, and that can be opened and is written by nobody else: nobody has named the file.
 ///
 /// # Errors
 /// If the system refuses.
@@ -139,7 +139,7 @@ fn open_free_place(
         let is_taken = taken.iter().any(|other| is_same_place(&place, other));
         if !is_taken && Stream::that_is(&place).is_none() && !is_of_others(&place) {
             match Opened::recording(&place) {
-                Err(RecordingError::Claimed { .. }) => {}
+                Err(_) if place.symlink_metadata().is_ok() => {}
                 opened => return opened.map(|file| (place, file)),
             }
         }
@@ -153,25 +153,34 @@ fn is_of_others(place: &Path) -> bool {
     !found.is_file() || found.nlink() > 1 || !begins_as_recording(place, found.len())
 }
 
-/// As a table or MCAP, an earlier one that was being replaced when a process was killed, or a file that was made and not begun.
-/// One that cannot be read tells nothing.
+/// True of a table or MCAP, of one that was replacing an earlier content when its process was killed, and of a file that was made and
+/// not begun. One that cannot be read tells nothing.
 fn begins_as_recording(file: &Path, bytes: u64) -> bool {
     let mut first = Vec::new();
     let read = File::open(file).and_then(|file| file.take(FIRST_BYTES).read_to_end(&mut first));
-    let is_known = is_table(&first) || first.starts_with(MCAP) || first.first() == Some(&HALF_REPLACED);
-    bytes == 0 || read.is_ok() && is_known
+    match first.split_first() {
+        None => bytes == 0 && read.is_ok(),
+        Some((&HALF_REPLACED, rest)) => goes_on_as_table(rest) || goes_on_as_mcap(rest),
+        Some((b't', rest)) => goes_on_as_table(rest),
+        Some((0x89, rest)) => goes_on_as_mcap(rest),
+        Some(_) => false,
+    }
 }
 
-/// True of the first bytes of a table: its second column is where the first finger's device is. A hand's file begins with a time, too.
-fn is_table(first: &[u8]) -> bool {
-    let mut columns = first.split(|&byte| byte == b',');
-    columns.next() == Some(b"t") && columns.next().is_some_and(|column| column.ends_with(b"_hip_x"))
+/// Asked of what is behind the `t` of a table: its second column is where the first finger's device is. A hand's file begins with
+/// a time, too.
+fn goes_on_as_table(rest: &[u8]) -> bool {
+    let mut columns = rest.split(|&byte| byte == b',');
+    columns.next() == Some(b"") && columns.next().is_some_and(|column| column.ends_with(b"_hip_x"))
+}
+
+/// Asked of what is behind the first byte of MCAP.
+fn goes_on_as_mcap(rest: &[u8]) -> bool {
+    rest.starts_with(b"MCAP0\r\n")
 }
 
 /// As many as a time and a finger's name need.
 const FIRST_BYTES: u64 = 4096;
-/// First bytes of MCAP.
-const MCAP: &[u8] = b"\x89MCAP0\r\n";
 
 fn numbered(path: &Path, number: u32) -> PathBuf {
     match path.extension() {
@@ -186,8 +195,9 @@ mod tests {
 
     #[test]
     fn what_begins_with_a_time_is_no_recording_yet() {
-        assert!(is_table(b"t,f0_hip_x,f0_hip_y") && is_table(b"t,thumb_hip_x"));
-        assert!(!is_table(b"t,f0_x,f0_y,f0_z") && !is_table(b"t,reaction_ms") && !is_table(b"t"));
+        let is_table = goes_on_as_table;
+        assert!(is_table(b",f0_hip_x,f0_hip_y") && is_table(b",thumb_hip_x"));
+        assert!(!is_table(b",f0_x,f0_y,f0_z") && !is_table(b",reaction_ms") && !is_table(b""));
     }
 
     fn free_place(first: &Path, scene: u32, taken: &[&PathBuf]) -> PathBuf {
@@ -224,10 +234,17 @@ mod tests {
         let (kind, mode) = (rustix::fs::FileType::Fifo, rustix::fs::Mode::RUSR);
         rustix::fs::mknodat(rustix::fs::CWD, file("w.7.csv"), kind, mode, 0).expect("a pipe");
         let _other_run = Opened::recording(&file("w.8.csv")).expect("a file");
-        assert_eq!(free_place(&first, 1, &[]), file("w.9.csv"));
-        for recording in [&b"t,f0_hip_x,f0_hip_y\n0,1,2\n"[..], b"\x89MCAP0\r\nrest", b"\0half", b""] {
-            std::fs::write(file("w.9.csv"), recording).expect("room");
-            assert_eq!(free_place(&first, 1, &[]), file("w.9.csv"), "a rerun writes the same files again");
+        std::fs::write(file("w.9.csv"), "\0\0\0\0").expect("room");
+        assert_eq!(free_place(&first, 1, &[]), file("w.10.csv"));
+        for recording in [
+            &b"t,f0_hip_x,f0_hip_y\n0,1,2\n"[..],
+            b"\x89MCAP0\r\nrest",
+            b"\0,f0_hip_x,f0",
+            b"\0MCAP0\r\nhalf",
+            b"",
+        ] {
+            std::fs::write(file("w.10.csv"), recording).expect("room");
+            assert_eq!(free_place(&first, 1, &[]), file("w.10.csv"), "a rerun writes the same files again");
         }
     }
 }

@@ -8,6 +8,7 @@
 //! letter, and is a file or a link, which is not followed.
 
 use super::Film;
+use rustix::fs::{Mode, OFlags};
 use std::ffi::OsStr;
 use std::fs::{File, TryLockError};
 use std::io;
@@ -16,29 +17,40 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 
-/// Claims the directory of a film, which is made if it is not there. The claim ends with the file; a directory that may not be
-/// read, or of a file system without such locks, has none.
+/// Directory of a film, while it has it.
+#[derive(Debug)]
+pub(super) struct Claim {
+    /// Whatever its name leads to later.
+    directory: File,
+    /// One that may not be read, or of a file system without such locks, has none.
+    _lock: Option<File>,
+}
+
+/// Claims the directory of a film, which is made if it is not there.
 ///
 /// # Errors
 /// If it cannot be made, or somebody holds a lock on it, in words.
-pub(super) fn claim(directory: &Path) -> Result<Option<File>, String> {
+pub(super) fn claim(directory: &Path) -> Result<Claim, String> {
     let place = directory.display();
-    std::fs::create_dir_all(directory).map_err(|error| format!("--frames {place}: {error}"))?;
-    let Ok(file) = File::open(directory) else { return Ok(None) };
-    match file.try_lock() {
-        Err(TryLockError::WouldBlock) => Err(format!(
+    let wrong = |error: io::Error| format!("--frames {place}: {error}");
+    std::fs::create_dir_all(directory).map_err(wrong)?;
+    let as_place = OFlags::PATH | OFlags::DIRECTORY | OFlags::CLOEXEC;
+    let itself = rustix::fs::open(directory, as_place, Mode::empty()).map_err(|errno| wrong(errno.into()))?;
+    let lock = File::open(directory).ok();
+    if matches!(lock.as_ref().map(File::try_lock), Some(Err(TryLockError::WouldBlock))) {
+        return Err(format!(
             "--frames {place}: somebody holds a lock on it, as a run does that makes a film there; name another directory, \
              or wait until it is released"
-        )),
-        Ok(()) | Err(TryLockError::Error(_)) => Ok(Some(file)),
+        ));
     }
+    Ok(Claim { directory: itself.into(), _lock: lock })
 }
 
 /// The names of one film.
 #[derive(Debug, Clone)]
 pub(super) struct FilmFiles {
     directory: PathBuf,
-    claim: Option<Arc<File>>,
+    claim: Arc<Claim>,
     /// The number behind the last picture that was written; 0: there is none.
     settled: Arc<AtomicU64>,
     /// Pictures of another film that cannot be removed.
@@ -47,8 +59,8 @@ pub(super) struct FilmFiles {
 
 impl FilmFiles {
     /// In the film's directory, claimed by this.
-    pub(super) fn of(film: &Film, claim: Option<File>) -> Self {
-        let (directory, claim) = (film.directory.clone(), claim.map(Arc::new));
+    pub(super) fn of(film: &Film, claim: Claim) -> Self {
+        let (directory, claim) = (film.directory.clone(), Arc::new(claim));
         Self { directory, claim, settled: Arc::default(), stuck: Arc::default() }
     }
 
@@ -70,8 +82,7 @@ impl FilmFiles {
     }
 
     fn check_directory(&self) -> io::Result<()> {
-        let Some(claim) = &self.claim else { return Ok(()) };
-        let [claimed, found] = [claim.metadata()?, self.directory.metadata()?];
+        let [claimed, found] = [self.claim.directory.metadata()?, self.directory.metadata()?];
         if (claimed.dev(), claimed.ino()) == (found.dev(), found.ino()) {
             return Ok(());
         }
@@ -79,9 +90,14 @@ impl FilmFiles {
     }
 
     /// The picture of this number is written.
-    pub(super) fn written(&self, number: u64) {
+    ///
+    /// # Errors
+    /// As [`Self::ready`]: it is in another directory.
+    pub(super) fn written(&self, number: u64) -> io::Result<()> {
+        self.check_directory()?;
         self.remove_before(number);
         self.settled.store(number + 1, Ordering::Relaxed);
+        Ok(())
     }
 
     /// The film is over: so many pictures were due.
@@ -110,6 +126,9 @@ impl FilmFiles {
 
     /// Pictures of another film that lie behind those of this one.
     pub(super) fn older(&self) -> usize {
+        if self.check_directory().is_err() {
+            return 0;
+        }
         let Ok(entries) = std::fs::read_dir(&self.directory) else { return 0 };
         let settled = self.settled.load(Ordering::Relaxed);
         let is_older = |name: &OsStr| {
@@ -155,7 +174,7 @@ mod tests {
         for number in [1, 3] {
             files.ready(number).expect("it is there");
             std::fs::write(name(number), "new").expect("room");
-            files.written(number);
+            files.written(number).expect("it is there");
         }
         assert!(name(5).exists(), "its picture may still come");
         files.settle(7);
@@ -173,12 +192,16 @@ mod tests {
         let film = Film { directory: directory.clone(), fps: 10.0 };
         let files = FilmFiles::of(&film, claim(&directory).expect("nobody has it"));
         files.ready(0).expect("it is there");
-        files.written(0);
+        files.written(0).expect("it is there");
+        std::fs::write(files.name(7), "older").expect("room");
+        assert_eq!(files.older(), 1);
         std::fs::rename(&directory, &other).expect("our own");
         assert_eq!(files.ready(1).expect_err("gone").kind(), io::ErrorKind::NotFound);
         std::fs::create_dir(&directory).expect("room");
         std::fs::write(files.name(1), "another's").expect("room");
         files.ready(1).expect_err("another one");
+        files.written(1).expect_err("it is in another one");
+        assert_eq!(files.older(), 0, "nothing of this film's");
         files.settle(2);
         assert!(files.name(1).exists(), "it is another's");
         std::fs::remove_dir_all(&directory)

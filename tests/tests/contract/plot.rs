@@ -178,9 +178,12 @@ fn a_picture_replaces_earlier_charts_alone_and_tells_it() {
     for (arguments, says) in [
         (
             &["plot", "lift.mcap"][..],
-            "lift.png would take the place of a file that is no chart of this program",
+            "lift.png would take the place of a file that is not known as a chart of this program",
         ),
-        (&["plot", "lift.csv"], "lift.png would take the place of a file that is no chart of this program"),
+        (
+            &["plot", "lift.csv"],
+            "lift.png would take the place of a file that is not known as a chart of this program",
+        ),
         (&["plot", "lift.csv", "--out", "made"], "made.png would take the place of a directory"),
     ] {
         let said = place.run(arguments);
