@@ -385,11 +385,11 @@ impl FastStep {
         true
     }
 
-    /// How far a fingertip is from a point of the world (m), at most.
-    pub fn farthest_m(&self, place_W: &Vector3<f64>) -> f64 {
+    /// How far a fingertip is from a point of the world (m), at most; `None` where no tip is known, as before a first frame.
+    pub fn farthest_m(&self, place_W: &Vector3<f64>) -> Option<f64> {
         let both = self.fingers.iter().zip(&self.tips_D);
         let tips = both.filter_map(|(finger, tip_D)| Some(finger.mount.point_to_world((*tip_D)?)));
-        tips.map(|tip_W| (tip_W - place_W).norm()).fold(0.0, f64::max)
+        tips.map(|tip_W| (tip_W - place_W).norm()).reduce(f64::max)
     }
 
     /// Forgets all contacts: the connection to the devices was lost meanwhile.

@@ -30,6 +30,8 @@ pub struct Carriage {
     /// Where devices have it.
     X_WC: Isometry3<f64>,
     goes: bool,
+    /// How far a fingertip is from the camera (m), at most, as last known: in the first tick of a world no tip is.
+    lever_m: f64,
 }
 
 impl Carriage {
@@ -37,7 +39,7 @@ impl Carriage {
     pub fn new(layout: Option<Layout>) -> Self {
         let layout = layout.unwrap_or_default();
         let X_WC = layout.camera().unwrap_or_else(Isometry3::identity);
-        Self { layout, to_WC: X_WC, leading_WC: X_WC, X_WC, goes: false }
+        Self { layout, to_WC: X_WC, leading_WC: X_WC, X_WC, goes: false, lever_m: 0.0 }
     }
 
     /// The camera is there.
@@ -51,7 +53,8 @@ impl Carriage {
         if !self.goes {
             return;
         }
-        let lever_m = step.farthest_m(&self.X_WC.translation.vector);
+        self.lever_m = step.farthest_m(&self.X_WC.translation.vector).unwrap_or(self.lever_m);
+        let lever_m = self.lever_m;
         let most_m = MOST_SPEED_M_S * dt_s;
         let left_m = way_m(&self.leading_WC, &self.to_WC, lever_m);
         self.leading_WC = if left_m <= most_m {

@@ -261,12 +261,19 @@ fn carried(hand: &str, orders: &str) -> (Workplace, Table) {
 
 #[test]
 fn devices_that_are_attached_to_the_camera_go_where_an_order_has_it_and_stay_there_through_a_reset() {
-    let turned = "at 0.2 camera at 0.1 0.2 0.45 0.92387953 0 0.38268343 0\nat 3.8 reset\n";
-    let (place, table) = carried("t,f0_x,f0_y,f0_z\n0,0,0.06,0\n", turned);
+    // When they are there, and on their way.
+    carried_through_a_reset([0.1, 0.2, 0.45], "3.8");
+    carried_through_a_reset([0.1, 0.2, 0.45], "0.5");
+    carried_through_a_reset([0.0, 0.2, 0.4], "0.5");
+}
+
+fn carried_through_a_reset([x, y, z]: [f64; 3], at: &str) {
+    let turned = format!("at 0.2 camera at {x} {y} {z} 0.92387953 0 0.38268343 0\nat {at} reset\n");
+    let (place, table) = carried("t,f0_x,f0_y,f0_z\n0,0,0.06,0\n", &turned);
     let hips: Vec<Vector3<f64>> = table.finger("f0").iter().map(|sample| sample.hip).collect();
     let was_WC = Isometry3::translation(0.0, 0.2, 0.4);
     let turn = UnitQuaternion::new_normalize(Quaternion::new(0.92387953, 0.0, 0.38268343, 0.0));
-    let is_WC = Isometry3::from_parts(Vector3::new(0.1, 0.2, 0.45).into(), turn);
+    let is_WC = Isometry3::from_parts(Vector3::new(x, y, z).into(), turn);
     let start = Vector3::new(0.0, 0.06, 0.0);
     let end = (is_WC * was_WC.inverse() * Point3::from(start)).coords;
     assert!(hips[..200].iter().all(|hip| (hip - start).norm() < 1e-12), "before the order");
