@@ -21,6 +21,7 @@ mod zero;
 use crate::config::DriverConfig;
 use crate::doctor::cli::{self as doctor, DoctorArgs};
 use crate::driver::{self, Fit, RunOptions};
+use crate::log_thread;
 use crate::monitor::{self, End};
 use crate::print::{self, print_line};
 use crate::say::{self, say};
@@ -175,6 +176,8 @@ fn run(args: RunArgs, fit: Option<Fit>) -> ExitCode {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => fail(&error, if error.is_fault() { EXIT_FAULT } else { EXIT_USAGE }),
     };
+    // One that could not start has no thread for its lines yet.
+    let _ = log_thread::start("io-driver");
     // Whoever holds the other end of standard error does not hold the end of the process.
     say::flush(LAST_WORDS);
     code

@@ -17,6 +17,7 @@ use crate::open::{OpenError, open_devices};
 use crate::real_loop::{RealLoop, Shared, Waiting};
 use crate::safety::{Ramps, Safety};
 use crate::sandbox;
+use crate::say::hold;
 use crate::service::{Service, remove_directory_of, say};
 use crate::stop_thread;
 use crate::supervisor::Supervisor;
@@ -133,6 +134,8 @@ pub fn run(config: &DriverConfig, options: &RunOptions) -> Result<(), RunError> 
     let install =
         if options.parent.is_some() { StopSignals::install_with_hangup } else { StopSignals::install };
     let signals = install().map_err(|source| RunError::System { what: "catch signals", source })?;
+    // Whoever holds the other end of standard error would hold up what they ask for.
+    hold();
     let user = sandbox::user_to_become(&config.process)?;
     die_with_parent(options)?;
     // Its socket is made here, while sockets may be made.

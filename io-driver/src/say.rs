@@ -5,17 +5,17 @@
 //!
 //! `eprintln!` panics when the write fails: whoever kills the `tee` behind `io-driver run 2>&1 | tee log`, or
 //! fills the disk under a log, would take the driver with it, motors on. And a write waits for as long as the other
-//! end likes: a terminal held by Ctrl-S, a pipe that nobody drains. So a driver that runs only queues its lines, and
-//! `log_thread` writes them.
-//! Invariant: once the log's thread is there, [`say`] never waits; a line that finds the queue full is counted.
+//! end likes: a terminal held by Ctrl-S, a pipe that nobody drains. So a driver only queues its lines, from where it catches
+//! signals on ([`hold`]), and `log_thread` writes them once it is there.
+//! Invariant: once lines are queued, [`say`] never waits; a line that finds the queue full is counted.
 
 use crate::arguments;
 use rt_core::plain_text::PlainLines;
 use std::fmt;
 use std::io::Write;
-use std::sync::OnceLock;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::mpsc::{Receiver, SyncSender, TrySendError, sync_channel};
+use std::sync::{Mutex, OnceLock, PoisonError};
 use std::time::{Duration, Instant};
 
 /// Lines that may wait for standard error.
@@ -24,6 +24,8 @@ const CAPACITY: usize = 1024;
 const LOOK: Duration = Duration::from_millis(1);
 
 static QUEUE: OnceLock<Queue> = OnceLock::new();
+/// The other end of the queue, until the log's thread has it.
+static HELD: Mutex<Option<Receiver<Entry>>> = Mutex::new(None);
 
 #[derive(Debug)]
 struct Queue {
@@ -109,8 +111,20 @@ pub fn dropped() -> u64 {
     QUEUE.get().map_or(0, |queue| queue.dropped.load(Ordering::Relaxed))
 }
 
-/// From now on lines are queued, for whoever holds what is returned; `None` if somebody does already.
+/// From now on lines are queued, until somebody asks for them.
+pub(crate) fn hold() {
+    if let Some(entries) = begin_queue() {
+        *HELD.lock().unwrap_or_else(PoisonError::into_inner) = Some(entries);
+    }
+}
+
+/// The queued lines, for whoever writes them; from now on lines are queued. `None` if somebody has them already.
 pub(crate) fn queue() -> Option<Receiver<Entry>> {
+    let held = HELD.lock().unwrap_or_else(PoisonError::into_inner).take();
+    held.or_else(begin_queue)
+}
+
+fn begin_queue() -> Option<Receiver<Entry>> {
     let (entries, received) = sync_channel(CAPACITY);
     let queue = Queue { entries, dropped: AtomicU64::new(0) };
     QUEUE.set(queue).is_ok().then_some(received)

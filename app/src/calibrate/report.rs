@@ -80,7 +80,7 @@ impl Report<'_> {
                 let factor = accuracy.factor_95();
                 writeln!(
                     out,
-                    "accuracy     in 95 of 100 calibrations within {:.4} mm where the points are, {} mm at the base, {} degrees; noise {:.3} mm, {freedom} degrees of freedom",
+                    "accuracy     along and about each axis, in 95 of 100 calibrations: within {:.4} mm where the points are, {} mm at the base, {} degrees; noise {:.3} mm, {freedom} degrees of freedom",
                     factor * middle_m * 1e3,
                     three(position_m, factor * 1e3, 3),
                     three(rotation_rad.map(f64::to_degrees), factor, 4),

@@ -289,6 +289,33 @@ fn full_pipe() -> (Stdio, std::io::PipeReader) {
     (writer.into(), reader)
 }
 
+/// It tells of the directory that it makes before it has a thread that writes.
+#[test]
+fn a_driver_that_starts_while_nobody_reads_what_it_says_is_stopped_and_ends_as_any_other() {
+    let directory = tempfile::tempdir().expect("a directory");
+    let [config, socket, taken] =
+        ["driver.toml", "made/driver.sock", "driver.toml/x.sock"].map(|name| directory.path().join(name));
+    std::fs::write(&config, resting("real", 1)).expect("room");
+    let start = |socket: &Path| {
+        let (err, reader) = full_pipe();
+        let mut command = programs::io_driver();
+        (
+            Running::start_saying_to(
+                command.arg("run").arg("--config").arg(&config).arg("--socket").arg(socket),
+                err,
+            ),
+            reader,
+        )
+    };
+    let (mut driver, _reader) = start(&socket);
+    patience::until("the driver answers", || io_driver(&["status"], &socket).status == Some(0));
+    assert_eq!(io_driver(&["emergency-stop"], &socket).status, Some(0));
+    driver.signal(Signal::TERM);
+    assert_eq!(driver.end().status, Some(0));
+    let (mut refused, _reader) = start(&taken);
+    assert_eq!(refused.end().status, Some(2));
+}
+
 fn without_threads(command: &str, driver: &Driver) -> Command {
     let mut asking = programs::io_driver();
     asking.env("RUST_MIN_STACK", ENDLESS).args([command, "--socket"]).arg(driver.socket());
