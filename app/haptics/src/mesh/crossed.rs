@@ -27,12 +27,17 @@ impl Mesh {
     pub(super) fn mark_crossed(&mut self, parts: &Parts) -> usize {
         let mut is_crossed = vec![false; self.faces.len()];
         let mut do_sheets_cross = false;
-        let is_done = self.for_each_crossed_pair(parts, |pair| {
+        let is_done = self.for_each_near_pair(parts, |pair, do_cross| {
             let [one, other] = pair.map(|face| &self.faces[face]);
             // Skins that lie on one another go nowhere.
-            do_sheets_cross |= [one.sides, other.sides].contains(&Sides::Sheet)
+            let is_of_sheets = [one.sides, other.sides].contains(&Sides::Sheet)
                 && one.normal_B.cross(&other.normal_B).norm() > PARALLEL;
-            pair.iter().for_each(|&face| is_crossed[face] = true);
+            // In heaps most is known of most faces already.
+            let is_known = pair.iter().all(|&face| is_crossed[face]) && (do_sheets_cross || !is_of_sheets);
+            if !is_known && do_cross() {
+                do_sheets_cross |= is_of_sheets;
+                pair.iter().for_each(|&face| is_crossed[face] = true);
+            }
         });
         let sheets = self.faces.iter().zip(&is_crossed).filter(|(face, _)| face.sides == Sides::Sheet);
         let crossed_sheets = sheets.filter(|(_, is_crossed)| **is_crossed).count();
@@ -51,9 +56,14 @@ impl Mesh {
         (LEAST_BALL * (high_B - low_B).max()).min(LEAST_BALL_M)
     }
 
-    /// Visits each pair of faces that pass through each other once; says whether these are all.
+    /// Visits each pair of faces that may pass through each other once, with the question whether they do; says whether these
+    /// are all.
     #[inline(always)]
-    pub(super) fn for_each_crossed_pair(&self, parts: &Parts, mut visit: impl FnMut([usize; 2])) -> bool {
+    pub(super) fn for_each_near_pair(
+        &self,
+        parts: &Parts,
+        mut visit: impl FnMut([usize; 2], &dyn Fn() -> bool),
+    ) -> bool {
         let slack_m = TOUCHING * self.extent_m;
         let mut left = MOST_PAIRS.saturating_mul(self.faces.len());
         self.bvh.for_each_pair(0.0, |i, j| {
@@ -63,8 +73,8 @@ impl Mesh {
             let normals = pair.map(|face| face.normal_B);
             let [one, other] = [i, j].map(|face| parts.of(face as usize));
             let is_obstacle = one != other || parts.is_orientable(one);
-            if is_obstacle && !are_neighbours() && do_cross(&corners(), &normals, slack_m) {
-                visit([i, j].map(|face| face as usize));
+            if is_obstacle && !are_neighbours() {
+                visit([i, j].map(|face| face as usize), &|| do_cross(&corners(), &normals, slack_m));
             }
             left -= 1;
             left > 0

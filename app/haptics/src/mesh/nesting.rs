@@ -65,9 +65,11 @@ impl Mesh {
             return outermost;
         }
         let mut crossed = HashSet::new();
-        let is_done = self.for_each_crossed_pair(parts, |pair| {
+        let is_done = self.for_each_near_pair(parts, |pair, do_cross| {
             let [a, b] = pair.map(|face| parts.of(face));
-            crossed.extend([[a, b], [b, a]]);
+            if !crossed.contains(&[a, b]) && do_cross() {
+                crossed.extend([[a, b], [b, a]]);
+            }
         });
         if !is_done {
             return outermost;
