@@ -24,7 +24,6 @@ use crate::record::read::{self, ReadError, RecordedRun};
 use crate::record::{self, About, Backpressure, Recorder, View};
 use crate::rig::Rig;
 use crate::row_queue::{RowReceiver, row_queue};
-use crate::run::EVENT_QUEUE;
 use crate::settings;
 use crate::slow;
 use crate::virtual_clock::VirtualDriver;
@@ -44,7 +43,7 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use world::Settings;
-use world::events::{Hub, event_queue};
+use world::events::{Hub, growing_event_queue};
 
 /// Of `--expect-same`, when something differs.
 const EXIT_DIFFERENT: u8 = 1;
@@ -184,7 +183,7 @@ impl Play {
         let bodies = step.bodies().len();
         let view = View::new(&rig.scene, step.entities());
         let book = Book::default();
-        let (events, event_ends) = event_queue(EVENT_QUEUE);
+        let (events, event_ends) = growing_event_queue();
         let mut hub = Hub::new(vec![event_ends]);
         let (sender, rows) = row_queue(bodies);
         // It ends with the recording.

@@ -41,11 +41,11 @@ use std::sync::mpsc::{self, Receiver};
 use std::time::Duration;
 use view::{NoWindow, OpenWindow, Reins, Stage, WindowSpec};
 use world::Settings;
-use world::events::{Hub, event_queue};
+use world::events::{Hub, event_queue, growing_event_queue};
 use world::lists::SlowList;
 
 /// Events that may wait between fast and slow side.
-pub const EVENT_QUEUE: usize = 8192;
+const EVENT_QUEUE: usize = 8192;
 
 /// What a run is to do with its rig.
 #[derive(Debug, Clone)]
@@ -167,7 +167,10 @@ impl Parts {
             slow_lists: (clock == ClockMode::Real).then_some(sender),
         };
         let shown = stage.map(|stage| Shown::on(stage, rig, step.entities()));
-        let (events, event_ends) = event_queue(EVENT_QUEUE);
+        let (events, event_ends) = match when_full {
+            WhenFull::Wait => growing_event_queue(),
+            WhenFull::Drop => event_queue(EVENT_QUEUE),
+        };
         let mut hub = Hub::new(vec![event_ends]);
         let opened = match window.zip(shown.clone()) {
             Some((spec, shown)) => {

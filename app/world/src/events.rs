@@ -4,7 +4,8 @@
 //! should have to find that in rows, and none of them may keep the fast thread waiting.
 //!
 //! Model: [`Watch`] compares each tick with the one before and tells what is new. An [`EventSender`] takes that without
-//! lock, allocation or waiting; what finds no room is counted, and told as [`Kind::Lost`] as soon as there is room again.
+//! lock, allocation or waiting; what finds no room is counted, and told as [`Kind::Lost`] as soon as there is room again. On
+//! clocks that wait there is always room.
 //! On the slow side one [`Hub`] hands every event to each [`Subscriber`] whose [`Filter`] lets it through: a closure, or the
 //! sending end of another queue.
 //!
@@ -28,7 +29,7 @@ mod filter;
 mod slow_pairs;
 mod watch;
 
-pub use bus::{EventReceiver, EventSender, Hub, Subscriber, event_queue};
+pub use bus::{EventReceiver, EventSender, Hub, Subscriber, event_queue, growing_event_queue};
 pub use event::{Change, Class, Event, Facts, Kind, Life, List, Why};
 pub use filter::Filter;
 pub use slow_pairs::{FastPairs, SlowPairs, pair_link};

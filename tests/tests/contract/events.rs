@@ -150,3 +150,28 @@ fn two_virtual_runs_tell_the_same_bytes() {
     });
     assert!(runs[0] == runs[1] && !runs[0].is_empty());
 }
+
+/// They meet the table in one tick, and leave it in one.
+#[test]
+fn on_a_clock_that_waits_no_event_is_lost_however_many_there_are_in_a_tick() {
+    const SIDE: usize = 46;
+    let mut scene = String::from(
+        "gravity_m_s2 = [0, -9.81, 0]\n[[finger]]\nstart_m = [5, 5, 5]\n[[entity]]\nname = \"table\"\n\
+         shape = { kind = \"plane\", normal = [0, 1, 0], offset_m = 0 }\nrestitution = 0.9\n",
+    );
+    for ball in 0..SIDE * SIDE {
+        let [x, z] = [ball / SIDE, ball % SIDE].map(|cell| cell as f64 * 0.05);
+        scene += &format!(
+            "[[entity]]\nname = \"ball{ball}\"\nshape = {{ kind = \"sphere\", radius_m = 0.01 }}\n\
+             position_m = [{x}, 0.015, {z}]\nmass_kg = 0.03\nrestitution = 0.9\n"
+        );
+    }
+    for fast_bodies in [0, SIDE * SIDE] {
+        let scene = format!("lists = {{ fast_bodies = {fast_bodies} }}\n{scene}");
+        let (_place, _rows, events) = ran(&scene, "t,f0_x,f0_y,f0_z\n0,5,5,5\n", "0.06");
+        let ticks: Vec<u32> = numbers(of_kind(&events, "pair-begin", "tick"));
+        assert_eq!(ticks.len(), SIDE * SIDE, "{ticks:?}");
+        assert_eq!(of_kind(&events, "pair-end", "tick").len(), SIDE * SIDE);
+        assert!(of_kind(&events, "events-lost", "number").is_empty());
+    }
+}

@@ -1,17 +1,19 @@
 //! From whoever sees events to whoever wants them.
 //!
-//! Invariants: sending takes a bounded time, without lock or allocation; nothing waits for a subscriber that is slow. Events
-//! of one sender arrive in order; what is missing is told where it is missing.
+//! Model: on a clock that waits a queue grows and nothing is lost ([`growing_event_queue`]); in real time it has so many places.
+//! Invariants: sending into places takes a bounded time, without lock or allocation; nothing waits for a subscriber that is slow.
+//! Events of one sender arrive in order; what is missing is told where it is missing.
 
 use super::{Class, Event, Filter, Kind};
 use rtrb::{Consumer, Producer, RingBuffer};
-use std::sync::Arc;
+use std::collections::VecDeque;
 use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 /// The sending end: that of a real-time thread, or of a subscriber with a queue of its own.
 #[derive(Debug)]
 pub struct EventSender {
-    queue: Producer<Event>,
+    queue: Sending,
     /// Since the last event that was sent.
     untold: u64,
     lost: Arc<AtomicU64>,
@@ -20,8 +22,27 @@ pub struct EventSender {
 /// The other end.
 #[derive(Debug)]
 pub struct EventReceiver {
-    queue: Consumer<Event>,
+    queue: Receiving,
     lost: Arc<AtomicU64>,
+}
+
+#[derive(Debug)]
+enum Sending {
+    Places(Producer<Event>),
+    Growing(Growing),
+}
+
+#[derive(Debug)]
+enum Receiving {
+    Places(Consumer<Event>),
+    Growing(Growing),
+}
+
+/// Both ends have it.
+type Growing = Arc<Mutex<VecDeque<Event>>>;
+
+fn held(events: &Growing) -> MutexGuard<'_, VecDeque<Event>> {
+    events.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
 /// A queue with so many places, two at least.
@@ -30,24 +51,57 @@ pub fn event_queue(places: usize) -> (EventSender, EventReceiver) {
     // Each place is written to once: the first touch of a page would otherwise be a fault of the fast thread.
     while queue.push(Event { run_tick: 0, kind: Kind::Reset }).is_ok() {}
     while end.pop().is_ok() {}
+    ends(Sending::Places(queue), Receiving::Places(end))
+}
+
+/// A queue that grows, for clocks that wait: it has a lock, and allocates.
+pub fn growing_event_queue() -> (EventSender, EventReceiver) {
+    let events = Growing::default();
+    ends(Sending::Growing(Arc::clone(&events)), Receiving::Growing(events))
+}
+
+fn ends(sending: Sending, receiving: Receiving) -> (EventSender, EventReceiver) {
     let lost = Arc::new(AtomicU64::new(0));
-    (EventSender { queue, untold: 0, lost: lost.clone() }, EventReceiver { queue: end, lost })
+    let sender = EventSender { queue: sending, untold: 0, lost: Arc::clone(&lost) };
+    (sender, EventReceiver { queue: receiving, lost })
 }
 
 impl EventSender {
     /// Sends; `false`, and counted, if there is no room.
     pub fn send(&mut self, event: Event) -> bool {
         let needed = if self.untold > 0 { 2 } else { 1 };
-        if self.queue.slots() < needed {
+        if self.slots() < needed {
             self.lose();
             return false;
         }
         if self.untold > 0 {
             let kind = Kind::Lost { count: std::mem::take(&mut self.untold) };
             // There is room for both.
-            let _ = self.queue.push(Event { run_tick: event.run_tick, kind });
+            self.push(Event { run_tick: event.run_tick, kind });
         }
-        self.queue.push(event).is_ok()
+        self.push(event)
+    }
+
+    fn push(&mut self, event: Event) -> bool {
+        match &mut self.queue {
+            Sending::Places(queue) => queue.push(event).is_ok(),
+            Sending::Growing(events) => {
+                held(events).push_back(event);
+                true
+            }
+        }
+    }
+
+    fn slots(&self) -> usize {
+        match &self.queue {
+            Sending::Places(queue) => queue.slots(),
+            Sending::Growing(_) => usize::MAX,
+        }
+    }
+
+    /// Whether it has room for whatever happens.
+    pub(super) fn grows(&self) -> bool {
+        matches!(self.queue, Sending::Growing(_))
     }
 
     /// Counts an event that is not sent.
@@ -58,19 +112,29 @@ impl EventSender {
 
     /// Whether another event might find no room.
     pub fn is_full(&self) -> bool {
-        self.queue.slots() < 2
+        self.slots() < 2
     }
 
     /// Whether nobody will ever take one.
     pub fn is_abandoned(&self) -> bool {
-        self.queue.is_abandoned()
+        match &self.queue {
+            Sending::Places(queue) => queue.is_abandoned(),
+            Sending::Growing(events) => Arc::strong_count(events) == 1,
+        }
     }
 }
 
 impl EventReceiver {
     /// The next event, if it is not of a later tick than this.
     pub fn receive(&mut self, up_to: u64) -> Option<Event> {
-        (self.queue.peek().ok()?.run_tick <= up_to).then(|| self.queue.pop().ok())?
+        let is_due = |event: &Event| event.run_tick <= up_to;
+        match &mut self.queue {
+            Receiving::Places(queue) => is_due(queue.peek().ok()?).then(|| queue.pop().ok())?,
+            Receiving::Growing(events) => {
+                let mut events = held(events);
+                if is_due(events.front()?) { events.pop_front() } else { None }
+            }
+        }
     }
 
     /// How many found no room so far.
@@ -80,7 +144,10 @@ impl EventReceiver {
 
     /// Whether no more will come than are there.
     pub fn is_abandoned(&self) -> bool {
-        self.queue.is_abandoned()
+        match &self.queue {
+            Receiving::Places(queue) => queue.is_abandoned(),
+            Receiving::Growing(events) => Arc::strong_count(events) == 1,
+        }
     }
 }
 

@@ -3,15 +3,16 @@
 //! Model: each side watches the pairs that it steps. When an island changes lists its pairs' lives go along, in a queue of
 //! their own: a contact goes on, and is told to begin and to end once. What the slow side finds it keeps back for a turn,
 //! since the life of a pair may arrive a little after the pair itself.
-//! Invariant: neither end waits or allocates. What finds no room is counted, and told as lost.
+//! Invariant: the fast end neither waits nor allocates. What finds no room on the way to it waits at the slow end, in order.
 
-use super::bus::{EventReceiver, EventSender, event_queue};
-use super::watch::{MOST_TOLD, Now, PairForce, PairLife, Pairs, Teller};
+use super::bus::{EventReceiver, EventSender, growing_event_queue};
+use super::watch::{Now, PairForce, PairLife, Pairs, Teller};
 use super::{Change, Event, Kind};
 use rtrb::{Consumer, Producer, RingBuffer};
+use std::collections::VecDeque;
 
-/// Pairs that the slow side watches at once.
-const MOST_PAIRS: usize = 8192;
+/// Pairs that the slow side has room for at first.
+const FIRST_PAIRS: usize = 8192;
 /// Lives, and events, that may be on their way.
 const ON_THE_WAY: usize = 4096;
 
@@ -38,11 +39,11 @@ pub struct SlowPairs {
     now: Now,
     from_fast: Consumer<PairLife>,
     to_fast: Producer<FromSlow>,
+    /// What has found no room there yet.
+    waiting: VecDeque<FromSlow>,
     /// What this turn finds, and what the turn before found.
     found: (EventSender, EventReceiver),
     adopted: Vec<PairLife>,
-    /// Events that found no room and have not been told.
-    lost: u64,
 }
 
 /// Both ends.
@@ -50,13 +51,13 @@ pub fn pair_link() -> (FastPairs, SlowPairs) {
     let (to_slow, from_fast) = RingBuffer::new(ON_THE_WAY);
     let (to_fast, from_slow) = RingBuffer::new(ON_THE_WAY);
     let slow = SlowPairs {
-        pairs: Pairs::with_capacity(MOST_PAIRS),
+        pairs: Pairs::with_capacity(FIRST_PAIRS),
         now: Now::default(),
         from_fast,
         to_fast,
-        found: event_queue(ON_THE_WAY),
+        waiting: VecDeque::new(),
+        found: growing_event_queue(),
         adopted: Vec::with_capacity(ON_THE_WAY),
-        lost: 0,
     };
     (FastPairs { to_slow, from_slow }, slow)
 }
@@ -66,7 +67,7 @@ impl SlowPairs {
     pub fn begin_turn(&mut self) {
         self.adopted.clear();
         while let Ok(life) = self.from_fast.pop() {
-            self.pairs.adopt(&life.seen_in(self.now.run_tick));
+            self.pairs.adopt(&life.seen_in(self.now.run_tick), true);
             self.adopted.push(life);
         }
         while let Some(event) = self.found.1.receive(u64::MAX) {
@@ -82,8 +83,9 @@ impl SlowPairs {
                 }
                 kind => kind,
             };
-            self.send(kind);
+            self.waiting.push_back(FromSlow::Happened(kind));
         }
+        self.send_waiting();
     }
 
     /// Something else has happened there.
@@ -91,17 +93,13 @@ impl SlowPairs {
         self.found.0.send(Event { run_tick: self.now.run_tick, kind });
     }
 
-    /// What finds no room is counted, and told when there is some.
-    fn send(&mut self, kind: Kind) {
-        if self.to_fast.slots() < 2 {
-            self.lost += 1;
-            return;
+    /// In order: a pair that goes over begins before it ends.
+    fn send_waiting(&mut self) {
+        while self.to_fast.slots() > 0
+            && let Some(next) = self.waiting.pop_front()
+        {
+            let _ = self.to_fast.push(next);
         }
-        if self.lost > 0 {
-            let count = std::mem::take(&mut self.lost);
-            let _ = self.to_fast.push(FromSlow::Happened(Kind::Lost { count }));
-        }
-        let _ = self.to_fast.push(FromSlow::Happened(kind));
     }
 
     /// After a tick of this length (s).
@@ -111,13 +109,17 @@ impl SlowPairs {
         dt_s: f64,
         rests: impl Fn([u32; 2]) -> bool,
     ) {
-        self.now = Now { run_tick: self.now.run_tick + 1, dt_s, period_s: dt_s, left: MOST_TOLD };
+        self.now = Now { run_tick: self.now.run_tick + 1, dt_s, period_s: dt_s, left: 0 };
         self.pairs.look(pairs, dt_s, rests, &mut Teller { now: &mut self.now, out: &mut self.found.0 });
     }
 
     /// Before entities go to the fast side: so do the lives of their pairs.
     pub fn go(&mut self, goes: impl Fn([u32; 2]) -> bool) {
-        let to_fast = &mut self.to_fast;
-        self.pairs.give_away(goes, |life| to_fast.push(FromSlow::Life(life)).is_ok());
+        let waiting = &mut self.waiting;
+        self.pairs.give_away(goes, |life| {
+            waiting.push_back(FromSlow::Life(life));
+            true
+        });
+        self.send_waiting();
     }
 }

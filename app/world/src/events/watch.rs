@@ -6,7 +6,8 @@
 //! settles does not chatter; while both rest, asleep, it goes on. The same holds for grasps.
 //!
 //! Invariants: no allocation after `new`; in a tick at most [`MOST_TOLD`] events, more are counted as lost, and so is a
-//! finger's contact without room. A pair or a grasp that finds no room is not watched.
+//! finger's contact without room. A pair or a grasp that finds no room is not watched. Where the sender's queue grows, so do the
+//! room for pairs and the number of events.
 //! Cost: linear in what touches, beside searches in what is sorted.
 
 mod fingers;
@@ -20,7 +21,7 @@ use grasps::Grasps;
 use nalgebra::Vector3;
 pub(super) use pairs::{PairLife, Pairs};
 
-/// The most events that a tick sends.
+/// The most events that a tick sends, unless the queue grows.
 pub const MOST_TOLD: usize = 256;
 /// A pair or a grasp that was not seen for so long has ended (s).
 pub const QUIET_S: f64 = 0.005;
@@ -119,9 +120,12 @@ impl Watch {
     /// Before [`Self::pairs`], where there is a slow list: takes up the pairs that come from there and what happened to those
     /// that are there, which is told in this tick.
     pub fn take_from_slow(&mut self, slow: &mut FastPairs, out: &mut EventSender) {
-        for _ in 0..MOST_TOLD {
+        let most = if out.grows() { usize::MAX } else { MOST_TOLD };
+        for _ in 0..most {
             match slow.from_slow.pop() {
-                Ok(FromSlow::Life(life)) => self.pairs.adopt(&life.seen_in(self.now.run_tick)),
+                Ok(FromSlow::Life(life)) => {
+                    self.pairs.adopt(&life.seen_in(self.now.run_tick), out.grows());
+                }
                 Ok(FromSlow::Happened(kind)) => self.tell(kind, out),
                 Err(_) => break,
             }
@@ -170,13 +174,19 @@ pub(super) struct Teller<'t> {
 impl Teller<'_> {
     fn tell(&mut self, kind: Kind) {
         let event = Event { run_tick: self.now.run_tick, kind };
-        match self.now.left.checked_sub(1) {
+        let left = if self.grows() { Some(self.now.left) } else { self.now.left.checked_sub(1) };
+        match left {
             Some(left) => {
                 self.now.left = left;
                 self.out.send(event);
             }
             None => self.out.lose(),
         }
+    }
+
+    /// There is room for whatever happens.
+    fn grows(&self) -> bool {
+        self.out.grows()
     }
 
     /// How long so many ticks are (s).

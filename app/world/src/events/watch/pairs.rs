@@ -39,12 +39,12 @@ impl PairLife {
 }
 
 impl Pairs {
-    /// Takes up one that the other side has watched until now.
-    pub(in crate::events) fn adopt(&mut self, from: &PairLife) {
+    /// Takes up one that the other side has watched until now, if there is room or there may be more.
+    pub(in crate::events) fn adopt(&mut self, from: &PairLife, grows: bool) {
         let PairLife { entities, life, quiet_s, pressed } = *from;
         match self.touching.binary_search_by_key(&entities, |pair| pair.entities) {
             Ok(at) => self.touching[at].life = life.followed_by(&self.touching[at].life),
-            Err(at) if self.touching.len() < self.most => {
+            Err(at) if grows || self.touching.len() < self.most => {
                 self.touching.insert(at, Pair { entities, life, pressed, quiet_s });
             }
             Err(_) => {}
@@ -115,7 +115,7 @@ impl Pairs {
                 (known.pressed, known.quiet_s) = (now, 0.0);
                 at + 1
             }
-            Err(at) if self.touching.len() < self.most => {
+            Err(at) if teller.grows() || self.touching.len() < self.most => {
                 let mut begun = Pair { entities, life: Life::default(), pressed: now, quiet_s: 0.0 };
                 begun.life.go_on(&force_W, dt_s, dt_s);
                 begun.tell(Change::Begins, teller);
