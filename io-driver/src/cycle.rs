@@ -69,6 +69,8 @@ pub struct Cycle {
     lease: Option<CommanderView>,
     /// A lease that waits for the former's force to ramp out.
     next_lease: Option<CommanderView>,
+    /// The next tick is its first.
+    begins_lease: bool,
     /// The lease ended; its force still ramps out.
     is_ending: bool,
     reply: Reply,
@@ -111,6 +113,7 @@ impl Cycle {
             freshness,
             lease: None,
             next_lease: None,
+            begins_lease: false,
             is_ending: false,
             reply: Reply::none(),
             frame,
@@ -185,6 +188,7 @@ impl Cycle {
         self.is_ending = false;
         self.reply.forget();
         self.safety.begin_lease();
+        self.begins_lease = self.lease.is_some();
         former
     }
 
@@ -245,6 +249,7 @@ impl Cycle {
             period_ns: self.period_ns,
             time_ns: self.read_clock.time_ns(),
             run_tick: self.safety.run_tick(tick),
+            begins_lease: std::mem::take(&mut self.begins_lease),
         };
         let answered = self.lease().and(self.reply.tick);
         self.zeros.begin_tick(tick, answered);

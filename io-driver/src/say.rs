@@ -6,7 +6,7 @@
 //! `eprintln!` panics when the write fails: whoever kills the `tee` behind `io-driver run 2>&1 | tee log`, or
 //! fills the disk under a log, would take the driver with it, motors on. And a write waits for as long as the other
 //! end likes: a terminal held by Ctrl-S, a pipe that nobody drains. So a driver only queues its lines, from where it catches
-//! signals on ([`hold`]), and `log_thread` writes them once it is there.
+//! signals on (`hold`), and `log_thread` writes them once it is there.
 //! Invariant: once lines are queued, [`say`] never waits; a line that finds the queue full is counted.
 
 use crate::arguments;

@@ -19,7 +19,8 @@
 //!   A short window's interval is wide and forgives that.
 //!
 //! Readings within half a millisecond are averaged first: more of them in less time say more about the
-//! velocity only if they differ, and the cost stays what it is at 2 kHz.
+//! velocity only if they differ, and the cost stays what it is at 2 kHz. A lease begins with a block of its own: what its
+//! commander is told does not show how long the driver was there before, but for the first window.
 //! Units: `places` in counts and velocities in counts per second, or both in metres.
 //! Invariants: with a tolerance of zero it is the plain difference `(place - last place) / (ticks * period)`, bit for
 //! bit: exact places are functions of the tick. Counts are taken at the time that the clock tells, so that deadlines
@@ -138,7 +139,8 @@ impl VelocityEstimator {
     /// Puts a reading where it belongs.
     fn keep(&mut self, time: TickTime, places: [f64; 3]) {
         let block_ticks = (BLOCK_NS / time.period_ns.max(1)).max(1);
-        if time.time_ns.saturating_sub(self.open.first_ns) >= block_ticks * time.period_ns {
+        let is_full = time.time_ns.saturating_sub(self.open.first_ns) >= block_ticks * time.period_ns;
+        if is_full || time.begins_lease {
             self.newest = (self.newest + 1) % PLACES;
             self.blocks[self.newest] = self.open;
             self.filled = (self.filled + 1).min(PLACES);

@@ -29,12 +29,14 @@ pub struct TickTime {
     pub time_ns: u64,
     /// Ticks since a lease first had full authority; negative before. The clock of scripted hands.
     pub run_tick: i64,
+    /// A lease begins with it.
+    pub begins_lease: bool,
 }
 
 impl TickTime {
     /// Under a clock that counts ticks, each of which takes a period.
     pub fn counted(tick: u64, period_ns: u64, run_tick: i64) -> Self {
-        Self { tick, period_ns, time_ns: tick.saturating_mul(period_ns), run_tick }
+        Self { tick, period_ns, time_ns: tick.saturating_mul(period_ns), run_tick, begins_lease: false }
     }
 
     /// Time since full authority (s); zero before.

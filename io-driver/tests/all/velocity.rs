@@ -45,6 +45,29 @@ fn exact_places_give_the_plain_difference_bit_for_bit_however_many_ticks_were_sk
 }
 
 #[test]
+fn a_lease_does_not_show_how_long_the_driver_was_there_before() {
+    for rate_hz in RATES_HZ {
+        let at_rest = (WINDOW_S * rate_hz as f64) as u64 + 1;
+        let lease = |ticks_before: u64| -> Vec<[f64; 3]> {
+            let mut estimator = VelocityEstimator::of_counts();
+            let mut noise = Noise::new(5);
+            let readings = (0..ticks_before + at_rest + 400).map(|tick| {
+                let moved = tick.saturating_sub(ticks_before + at_rest) as f64;
+                let places = [3.0, 0.0, -7.0].map(|start| match moved {
+                    0.0 => start,
+                    _ => start + (noise.gaussian() + 0.05 * moved).round(),
+                });
+                let begins_lease = tick == ticks_before;
+                estimator.observe(TickTime { begins_lease, ..at(tick, rate_hz) }, places)
+            });
+            readings.skip((ticks_before + at_rest) as usize).collect()
+        };
+        let first = lease(800);
+        assert!((801..812).all(|ticks_before| lease(ticks_before) == first), "{rate_hz} Hz");
+    }
+}
+
+#[test]
 fn of_a_parabola_it_is_the_slope_now_also_where_ticks_are_skipped() {
     for rate_hz in RATES_HZ {
         let mut estimator = VelocityEstimator::of_counts();

@@ -73,16 +73,19 @@ fn two_virtual_runs_write_the_same_bytes_and_another_seed_trembles_otherwise() {
     assert!((after_wish("a.csv") - after_wish("c.csv")).norm() < 2e-3);
 }
 
-/// However long the driver waited for its commander before.
+/// However long the driver waited for its commander before; with a damper, which feels what velocity the driver tells.
 #[test]
 fn lockstep_runs_and_a_virtual_one_write_the_same_bytes() {
-    let place = workplace(TABLE, &pressing());
+    let damped = format!("{TABLE}damping_n_s_per_m = 1.0\n");
+    let place = workplace(&damped, &pressing());
     let all = [("a.csv", "lockstep"), ("b.csv", "lockstep"), ("c.csv", "virtual")];
-    for (name, clock) in all {
-        record(&place, clock, name, &["--hand", "hand.csv", "--seconds", "1"]);
-    }
-    for (name, clock) in all {
-        assert!(bytes(&place, "a.csv") == bytes(&place, name), "{clock}");
+    for rate_hz in ["1000", "8000"] {
+        for (name, clock) in all {
+            record(&place, clock, name, &["--hand", "hand.csv", "--seconds", "1.2", "--rate-hz", rate_hz]);
+        }
+        for (name, clock) in all {
+            assert!(bytes(&place, "a.csv") == bytes(&place, name), "{clock} {rate_hz} Hz");
+        }
     }
 }
 
