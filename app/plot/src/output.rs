@@ -59,7 +59,7 @@ pub(crate) fn svg(figure: &Figure) -> Result<String, PlotError> {
     Ok(format!("{tag}>\n<!-- {MADE_BY} -->{rest}"))
 }
 
-/// True if this file is a picture that [`svg`] or [`png`] made.
+/// True if this file is a picture that a [`Figure`] wrote.
 ///
 /// # Errors
 /// If it cannot be read.
