@@ -24,6 +24,7 @@ use crate::record::read::{self, ReadError, RecordedRun};
 use crate::record::{self, About, Backpressure, Recorder, View};
 use crate::rig::Rig;
 use crate::row_queue::{RowReceiver, row_queue};
+use crate::run::EVENT_QUEUE;
 use crate::settings;
 use crate::slow;
 use crate::virtual_clock::VirtualDriver;
@@ -183,7 +184,7 @@ impl Play {
         let bodies = step.bodies().len();
         let view = View::new(&rig.scene, step.entities());
         let book = Book::default();
-        let (events, event_ends) = growing_event_queue();
+        let (events, event_ends) = growing_event_queue(EVENT_QUEUE);
         let mut hub = Hub::new(vec![event_ends]);
         let (sender, rows) = row_queue(bodies);
         // It ends with the recording.

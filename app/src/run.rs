@@ -45,7 +45,7 @@ use world::events::{Hub, event_queue, growing_event_queue};
 use world::lists::SlowList;
 
 /// Events that may wait between fast and slow side.
-const EVENT_QUEUE: usize = 8192;
+pub const EVENT_QUEUE: usize = 8192;
 
 /// What a run is to do with its rig.
 #[derive(Debug, Clone)]
@@ -168,7 +168,7 @@ impl Parts {
         };
         let shown = stage.map(|stage| Shown::on(stage, rig, step.entities()));
         let (events, event_ends) = match when_full {
-            WhenFull::Wait => growing_event_queue(),
+            WhenFull::Wait => growing_event_queue(EVENT_QUEUE),
             WhenFull::Drop => event_queue(EVENT_QUEUE),
         };
         let mut hub = Hub::new(vec![event_ends]);

@@ -5,8 +5,9 @@
 //! `K = sum k n n'`, effects as their [`Gains`]; masses of inertial fields as numbers. The largest eigenvalue is what the
 //! loop feels along its axis. Contacts are judged by what the loop stands, as single ones are; effects, and the damping of
 //! everything, by the [`Limits`] that single ones are refused above: each counts by its share of its own limit.
-//! Cost: some sixty places for each thing that others reach into, and none for things that lie apart; of effects, as many
-//! groups as there are effects, or pairs of a few.
+//! Cost: some hundred places for each thing that others reach into, and none for things that lie apart; of heaps, one in so many
+//! of these that all things are touched [`MOST_LOOKS`] times or less, which is told; of effects, as many groups as there are
+//! effects, or pairs of a few.
 
 #![allow(non_snake_case)] // Frames are capital letters.
 
@@ -22,12 +23,14 @@ use std::collections::BTreeMap;
 pub(super) fn too_much(rig: &Rig, entities: &[Entity], stands: &mut Stands) -> Vec<String> {
     let Some(world) = World::of(rig, entities) else { return Vec::new() };
     let mut found = Found::default();
-    for radius_m in radii(rig) {
-        for (index, near) in neighbours(entities).into_iter().enumerate().filter(|(_, near)| !near.is_empty())
-        {
+    let (near_all, radii) = (neighbours(entities), radii(rig));
+    let every = every(&near_all, radii.len());
+    for radius_m in radii {
+        for (index, near) in near_all.iter().enumerate().filter(|(_, near)| !near.is_empty()) {
             let above = drawn_at(&entities[index], radius_m);
-            for place_W in places(&entities[index]).into_iter().chain(above) {
-                world.judge((&near, entities[index].space), radius_m, &place_W, stands, &mut found);
+            let all = places(&entities[index]).into_iter().chain(above);
+            for place_W in all.skip(index % every).step_by(every) {
+                world.judge((near, entities[index].space), radius_m, &place_W, stands, &mut found);
             }
         }
         for place_W in world.common_places() {
@@ -35,7 +38,20 @@ pub(super) fn too_much(rig: &Rig, entities: &[Entity], stands: &mut Stands) -> V
             world.judge((&near, WORLD), radius_m, &place_W, stands, &mut found);
         }
     }
-    found.told(|thing| world.name(thing))
+    let mut told = found.told(|thing| world.name(thing));
+    if every > 1 {
+        told.push(format!(
+            "so much reaches into other things here that one place in {every} was looked at for what is too strong together"
+        ));
+    }
+    told
+}
+
+/// One in so many places is looked at, where so many things reach into each one, for so many sizes of fingers.
+fn every(near: &[Vec<u32>], radii: usize) -> usize {
+    let crowded = near.iter().map(Vec::len).filter(|things| *things > 1);
+    let looks = crowded.sum::<usize>() * PLACES * radii;
+    looks.div_ceil(MOST_LOOKS).max(1)
 }
 
 /// All that fingers feel.
@@ -392,3 +408,26 @@ const TAKES_PART: f64 = 0.05;
 /// Of shares that are 1 together by what a scene says.
 const ROUNDING: f64 = 1e-9;
 const MOST_TOLD: usize = 10;
+/// Of a thing: a centre, and so many shares of the ways to the corners, edges and faces of a cube.
+const PLACES: usize = 1 + 26 * SHARES.len();
+/// Things that are touched, for all places and fingers together.
+const MOST_LOOKS: usize = 200_000;
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn of_heaps_so_many_places_are_looked_at_that_the_looks_are_bounded() {
+        let in_heap = |things: usize, each: u32| vec![(0..each).collect::<Vec<u32>>(); things];
+        assert_eq!([every(&in_heap(100, 1), 5), every(&in_heap(100, 3), 5), every(&[], 0)], [1; 3]);
+        for (things, each) in [(1000, 4), (600, 600), (10_000, 30)] {
+            let every = every(&in_heap(things, each), 5);
+            let looks = things * each as usize * (PLACES / every + 1) * 5;
+            assert!(
+                every > 1 && looks <= MOST_LOOKS + things * each as usize * 5,
+                "{things} {each}: {every} {looks}"
+            );
+        }
+    }
+}

@@ -54,9 +54,9 @@ pub fn event_queue(places: usize) -> (EventSender, EventReceiver) {
     ends(Sending::Places(queue), Receiving::Places(end))
 }
 
-/// A queue that grows, for clocks that wait: it has a lock, and allocates.
-pub fn growing_event_queue() -> (EventSender, EventReceiver) {
-    let events = Growing::default();
+/// A queue that has so many places at first and grows, for clocks that wait: it has a lock, and may allocate.
+pub fn growing_event_queue(places: usize) -> (EventSender, EventReceiver) {
+    let events = Growing::new(Mutex::new(VecDeque::with_capacity(places)));
     ends(Sending::Growing(Arc::clone(&events)), Receiving::Growing(events))
 }
 

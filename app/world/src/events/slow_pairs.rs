@@ -55,8 +55,8 @@ pub fn pair_link() -> (FastPairs, SlowPairs) {
         now: Now::default(),
         from_fast,
         to_fast,
-        waiting: VecDeque::new(),
-        found: growing_event_queue(),
+        waiting: VecDeque::with_capacity(ON_THE_WAY),
+        found: growing_event_queue(ON_THE_WAY),
         adopted: Vec::with_capacity(ON_THE_WAY),
     };
     (FastPairs { to_slow, from_slow }, slow)
