@@ -411,7 +411,7 @@ const MOST_TOLD: usize = 10;
 /// Of a thing: a centre, and so many shares of the ways to the corners, edges and faces of a cube.
 const PLACES: usize = 1 + 26 * SHARES.len();
 /// Things that are touched, for all places and fingers together.
-const MOST_LOOKS: usize = 200_000;
+const MOST_LOOKS: usize = 60_000;
 
 #[cfg(test)]
 mod tests {

@@ -4,10 +4,12 @@
 use crate::{common, meshes};
 
 use common::{G, body, floor, object};
+use haptics::mesh::Mesh;
 use haptics::{Cuboid, Entity, Sphere};
 use nalgebra::{Isometry3, UnitQuaternion, Vector3};
 use physics::{Body, BodyError, ContactStiffness, Manipulation, MassProperties, Response, Settings};
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
+use std::sync::Arc;
 
 const BY_MASS: ContactStiffness = ContactStiffness::ByMass { damping_ratio: 1.0 };
 /// [rad/s]: as the heaviest body would swing.
@@ -286,17 +288,40 @@ fn what_is_pressed_steadily_or_fast_is_held_by_its_spring() {
     }
 }
 
+/// Upright along z.
+fn can(sides: u32) -> Arc<Mesh> {
+    let corner = |side: u32| {
+        let angle = TAU * f64::from(side) / f64::from(sides);
+        [0.03 * angle.cos(), 0.03 * angle.sin()]
+    };
+    let outline: Vec<[f64; 2]> = (0..sides).map(corner).collect();
+    let triangles: Vec<[u32; 3]> = (1..sides - 1).map(|side| [0, side, side + 1]).collect();
+    meshes::build(meshes::prism(&outline, &triangles, 0.08))
+}
+
+/// A limit, which the manual tells: eight of the corners count, and which ones changes as they come and go on soft points.
+#[test]
+fn round_meshes_as_felt_rock_where_more_than_eight_corners_stand_and_by_mass_they_do_not() {
+    let leans_most = |sides: u32, stiffness: ContactStiffness| -> f64 {
+        let turn = UnitQuaternion::from_axis_angle(&Vector3::x_axis(), -FRAC_PI_2);
+        let at = Isometry3::from_parts(Vector3::new(0.0, 0.042, 0.0).into(), turn);
+        let mut table =
+            Table::new(vec![(object(can(sides), at, 1000.0, 0.5), 0.3)], settings(stiffness), 1000.0);
+        (0..2000).fold(0.0, |most: f64, _| {
+            table.run(1e-3);
+            most.max((table.entities[1].X_WB.rotation * Vector3::z()).y.abs().min(1.0).acos())
+        })
+    };
+    assert!(leans_most(8, ContactStiffness::AsFelt) < 1e-6);
+    assert!(leans_most(24, ContactStiffness::AsFelt) > 1_f64.to_radians());
+    assert!(leans_most(24, BY_MASS) < 1e-3);
+}
+
 /// As one sways, other corners of many bear it; on hard contacts it does not sway.
 #[test]
 fn round_meshes_that_are_put_down_stand_upright_and_rest_within_a_second() {
     for (sides, rate_hz) in [(8, 1000.0), (48, 500.0), (48, 1000.0), (48, 4000.0), (200, 1000.0)] {
-        let corner = |side: u32| {
-            let angle = TAU * f64::from(side) / f64::from(sides);
-            [0.03 * angle.cos(), 0.03 * angle.sin()]
-        };
-        let outline: Vec<[f64; 2]> = (0..sides).map(corner).collect();
-        let triangles: Vec<[u32; 3]> = (1..sides - 1).map(|side| [0, side, side + 1]).collect();
-        let mesh = meshes::build(meshes::prism(&outline, &triangles, 0.08));
+        let mesh = can(sides);
         for lean in [0.0, 0.02, 0.1] {
             let up = UnitQuaternion::from_axis_angle(&Vector3::x_axis(), lean - FRAC_PI_2);
             let turn = up * UnitQuaternion::from_axis_angle(&Vector3::z_axis(), 0.3);
