@@ -553,3 +553,44 @@ fn with_friction_a_shaded_force_changes_with_the_hand_or_with_what_it_is_made_of
         }
     }
 }
+
+/// A prism's ridge, gone over 3 mm deep, 4 um a tick; K is 500 N/m.
+#[test]
+fn over_a_ridge_a_shaded_force_leaps_where_it_bends_by_more_than_37_degrees_and_less_than_in_facets() {
+    let largest_change_n = |bend: f64, is_shaded: bool| {
+        let (sin, cos) = f64::sin_cos(0.5 * bend);
+        let outline = [
+            [-0.05 * cos, -0.05 * sin],
+            [-0.05 * cos, -0.08],
+            [0.05 * cos, -0.08],
+            [0.05 * cos, -0.05 * sin],
+            [0.0, 0.0],
+        ];
+        let mesh = built(prism(&outline, 0.05));
+        let shading = if is_shaded { interpolated(&mesh) } else { Shading::None };
+        let entity = shaded(&mesh, Friction::None, shading);
+        let [along, normal] = [[cos, sin, 0.0], [-sin, cos, 0.0]].map(Vector3::from);
+        let (mut finger, mut before, mut most_n) = (point_finger(), None, 0.0_f64);
+        step(&mut finger, &entity, &(along * -8e-3 + normal * 1e-3));
+        for tick in 0..4000 {
+            let felt =
+                step(&mut finger, &entity, &(along * (-8e-3 + 4e-6 * f64::from(tick)) - normal * 3e-3));
+            let force = felt.force_on_user_W;
+            most_n =
+                most_n.max(before.replace(force).map_or(0.0, |before: Vector3<f64>| (force - before).norm()));
+        }
+        most_n
+    };
+    // Where the god-object leaps the size of its force changes by up to 1 / cos(bend), which is 1.25 at 37 degrees.
+    for bend in [5.0_f64, 20.0, 35.0].map(f64::to_radians) {
+        let [faceted_n, shaded_n] = [false, true].map(|is_shaded| largest_change_n(bend, is_shaded));
+        assert!(shaded_n < 0.01 * faceted_n, "{bend}: {shaded_n} N, {faceted_n} N in facets");
+    }
+    for bend in [50.0_f64, 80.0].map(f64::to_radians) {
+        let [faceted_n, shaded_n] = [false, true].map(|is_shaded| largest_change_n(bend, is_shaded));
+        assert!(
+            (0.3..1.0).contains(&(shaded_n / faceted_n)),
+            "{bend}: {shaded_n} N, {faceted_n} N in facets"
+        );
+    }
+}
