@@ -152,8 +152,14 @@ impl Pair {
         }
         let poses = [[&a.X_WB, &b.X_WB], [&a.previous_X_WB, &b.previous_X_WB]];
         let begins = self.count == 0;
-        let deep_m = reach_m.min(self.surfacing.deepest_rest_m());
-        self.carry(&found, poses, deep_m, speed_m_s * start.dt_s, last);
+        let deep = if self.surfacing.deepest_rest_m().is_finite() {
+            Deep { from_m: reach_m.min(self.surfacing.deepest_rest_m()), presses_m: 0.0 }
+        } else {
+            // Soft things may rest so deep.
+            let presses_m = reach_m.max(self.throws_m(LET_OUT_M_S, start));
+            Deep { from_m: presses_m, presses_m }
+        };
+        self.carry(&found, poses, deep, speed_m_s * start.dt_s, last);
         let pressed = self.anchors[..self.count].iter().filter(|anchor| anchor.is_pressed()).count();
         let resists_turning = (1..=turning::MOST_POINTS).contains(&pressed);
         if !resists_turning {
@@ -380,7 +386,7 @@ impl Pair {
         &mut self,
         found: &ContactPoints,
         [now, last]: [[&Isometry3<f64>; 2]; 2],
-        deep_m: f64,
+        deep: Deep,
         moved_m: f64,
         last_anchors: &mut [Anchor; MAX_POINTS],
     ) {
@@ -412,8 +418,8 @@ impl Pair {
                 continue;
             }
             self.anchors[at] = Anchor::begin(point, now[0], now[1]);
-            if begins && self.ledger.is_closed() && point.depth_m() > deep_m {
-                self.anchors[at].granted_m = point.depth_m();
+            if begins && self.ledger.is_closed() && point.depth_m() > deep.from_m {
+                self.anchors[at].granted_m = point.depth_m() - deep.presses_m;
             }
         }
     }
@@ -423,6 +429,15 @@ impl Pair {
         let (a, b) = self.bodies;
         speeds_m_s[a] + b.map_or(0.0, |b| speeds_m_s[b])
     }
+}
+
+/// A depth in which a contact may be found at once \[m\].
+#[derive(Debug, Clone, Copy)]
+struct Deep {
+    /// From which on it is let out slowly.
+    from_m: f64,
+    /// What of it presses at once.
+    presses_m: f64,
 }
 
 /// The most that any point of a body moves per time \[m/s\].

@@ -288,6 +288,32 @@ fn what_is_pressed_steadily_or_fast_is_held_by_its_spring() {
     }
 }
 
+/// As deep as they carry each other: two springs of 1000 N/m in each of four corners.
+#[test]
+fn stacks_that_begin_at_rest_as_felt_stay_where_they_are() {
+    for (cubes, rate_hz) in [(1, 1000.0), (3, 500.0), (3, 1000.0), (5, 1000.0), (5, 8000.0)] {
+        let mut top_m = 0.0;
+        let stack = (0..cubes).map(|below| {
+            let depth_m = 0.1 * G * f64::from(cubes - below) / (4.0 * 500.0);
+            let centre_m = top_m + 0.02 - depth_m;
+            top_m = centre_m + 0.02;
+            let shape = Cuboid::new([0.04; 3]).unwrap();
+            (object(shape, Isometry3::translation(0.0, centre_m, 0.0), 1000.0, 0.5), 0.1)
+        });
+        let stack: Vec<(Entity, f64)> = stack.collect();
+        let before: Vec<f64> = stack.iter().map(|(cube, _)| cube.X_WB.translation.y).collect();
+        let mut table = Table::new(stack, settings(ContactStiffness::AsFelt), rate_hz);
+        for _ in 0..20 {
+            table.run(0.05);
+            for (cube, before) in table.entities[1..].iter().zip(&before) {
+                let moved_m = cube.X_WB.translation.y - before;
+                // The deepest is 2.5 mm deep.
+                assert!(moved_m.abs() < 1e-7, "{cubes} at {rate_hz} Hz: {moved_m}");
+            }
+        }
+    }
+}
+
 /// Upright along z.
 fn can(sides: u32) -> Arc<Mesh> {
     let corner = |side: u32| {
