@@ -10,6 +10,7 @@ use crate::say::{self, Entry};
 use rt_core::log::{LogLevel, LogLine, RtLogDrain};
 use std::io;
 use std::sync::mpsc::{Receiver, RecvTimeoutError, sync_channel};
+use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
 
 /// How often it looks at the loop's records when nobody else says anything.
@@ -44,12 +45,24 @@ fn begin(program: &'static str, drain: Option<RtLogDrain>, quiet: bool) -> io::R
     // A process has one driver; the lines of a second one go the way of the first one's.
     let Some(entries) = say::queue() else { return Ok(()) };
     let log = LogThread { program, entries, drain, quiet, dropped_told: 0 };
+    let here = Arc::new(Mutex::new(Some(log)));
+    let there = Arc::clone(&here);
+    let take = |log: &Mutex<Option<LogThread>>| log.lock().unwrap_or_else(PoisonError::into_inner).take();
     let (begun, has_begun) = sync_channel::<()>(0);
     let thread = std::thread::Builder::new().name("log".into()).stack_size(STACK_BYTES);
-    thread.spawn(move || {
+    let started = thread.spawn(move || {
         drop(begun);
-        log.run();
-    })?;
+        if let Some(log) = take(&there) {
+            log.run();
+        }
+    });
+    if let Err(error) = started {
+        // What has been said until now, perhaps why nothing can be started.
+        if let Some(log) = take(&here) {
+            log.write_what_waits();
+        }
+        return Err(error);
+    }
     // The sandbox that is shut next knows nothing of the calls by which a thread begins.
     let _ = has_begun.recv();
     Ok(())
@@ -67,6 +80,14 @@ impl LogThread {
                 Err(RecvTimeoutError::Disconnected) => return,
             }
             self.tell_dropped();
+        }
+    }
+
+    fn write_what_waits(self) {
+        for entry in self.entries.try_iter() {
+            if let Entry::Line(line) | Entry::Status(line) = entry {
+                say::write_if_taken(&line);
+            }
         }
     }
 

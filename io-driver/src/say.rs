@@ -11,6 +11,7 @@
 
 use crate::arguments;
 use rt_core::plain_text::PlainLines;
+use rustix::event::{PollFd, PollFlags, Timespec, poll};
 use std::fmt;
 use std::io::Write;
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -20,6 +21,10 @@ use std::time::{Duration, Instant};
 
 /// Lines that may wait for standard error.
 const CAPACITY: usize = 1024;
+/// Of a pipe that takes anything, without waiting (bytes): `PIPE_BUF`.
+const TAKEN_AT_ONCE: usize = 4096;
+/// For standard error to take something.
+const PATIENCE: Timespec = Timespec { tv_sec: 0, tv_nsec: 500_000_000 };
 /// Between two looks whether the queue has room.
 const LOOK: Duration = Duration::from_millis(1);
 
@@ -52,7 +57,7 @@ pub fn say(line: fmt::Arguments<'_>) {
         Some(queue) => match queue.entries.try_send(Entry::Line(line)) {
             Ok(()) => {}
             // The log's thread could not be started: why is what is to be told.
-            Err(TrySendError::Disconnected(Entry::Line(line))) => write(&line),
+            Err(TrySendError::Disconnected(Entry::Line(line))) => write_if_taken(&line),
             Err(_) => {
                 queue.dropped.fetch_add(1, Ordering::Relaxed);
             }
@@ -128,6 +133,17 @@ fn begin_queue() -> Option<Receiver<Entry>> {
     let (entries, received) = sync_channel(CAPACITY);
     let queue = Queue { entries, dropped: AtomicU64::new(0) };
     QUEUE.set(queue).is_ok().then_some(received)
+}
+
+/// Writes as much as the other end of standard error takes within half a second: signals are caught already.
+pub(crate) fn write_if_taken(line: &str) {
+    let err = std::io::stderr();
+    for piece in line.as_bytes().chunks(TAKEN_AT_ONCE) {
+        match poll(&mut [PollFd::new(&err, PollFlags::OUT)], Some(&PATIENCE)) {
+            Ok(0) | Err(_) => return,
+            Ok(_) => drop((&err).write_all(piece)),
+        }
+    }
 }
 
 /// May wait for as long as the other end of standard error likes.
