@@ -385,7 +385,7 @@ impl FastStep {
         true
     }
 
-    /// How far a fingertip is from a point of the world (m), at most; `None` where no tip is known, as before a first frame.
+    /// Distance of a fingertip from a point of the world (m), at most; `None` where no tip is known, as before a first frame.
     pub fn farthest_m(&self, place_W: &Vector3<f64>) -> Option<f64> {
         let both = self.fingers.iter().zip(&self.tips_D);
         let tips = both.filter_map(|(finger, tip_D)| Some(finger.mount.point_to_world((*tip_D)?)));

@@ -69,7 +69,8 @@
 #define PHANTOM_ANSWER_TIMEOUT_S 2
 /* How many symbolic links a path may lead through; the kernel's own bound. */
 #define PHANTOM_MAX_LINKS 40
-/* Room for a path and for what a symbolic link leads to. More than a socket's address has: the next link may lead to a short name. */
+/* Room for a path and for what a symbolic link leads to. More than a socket's address has: the next link may lead to a short
+ * name. */
 #define PHANTOM_PATH_BYTES 1024
 
 /* What an application holds of the driver. */

@@ -436,7 +436,7 @@ impl Pair {
 struct Deep {
     /// From which on it is let out slowly.
     from_m: f64,
-    /// What of it presses at once.
+    /// Part of it that presses at once.
     presses_m: f64,
 }
 

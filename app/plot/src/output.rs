@@ -12,7 +12,7 @@ use thiserror::Error;
 
 /// Pixels of a PNG for each unit of the description.
 const PNG_SCALE: f64 = 2.0;
-/// What is told in a picture of who made it.
+/// Maker, as pictures tell it.
 const MADE_BY: &str = "drawn by phantom3";
 /// That is among the first so many bytes.
 const MARKED_BYTES: u64 = 512;

@@ -30,7 +30,7 @@ pub struct Carriage {
     /// Where devices have it.
     X_WC: Isometry3<f64>,
     goes: bool,
-    /// How far a fingertip is from the camera (m), at most, as last known: in the first tick of a world no tip is.
+    /// Distance of a fingertip from the camera (m), at most, as last known: in the first tick of a world no tip is.
     lever_m: f64,
 }
 

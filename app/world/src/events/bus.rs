@@ -99,7 +99,7 @@ impl EventSender {
         }
     }
 
-    /// Whether it has room for whatever happens.
+    /// True if it has room for whatever happens.
     pub(super) fn grows(&self) -> bool {
         matches!(self.queue, Sending::Growing(_))
     }

@@ -39,7 +39,7 @@ pub struct SlowPairs {
     now: Now,
     from_fast: Consumer<PairLife>,
     to_fast: Producer<FromSlow>,
-    /// What has found no room there yet.
+    /// News that have found no room there yet.
     waiting: VecDeque<FromSlow>,
     /// What this turn finds, and what the turn before found.
     found: (EventSender, EventReceiver),
