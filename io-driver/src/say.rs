@@ -14,7 +14,7 @@ use rt_core::plain_text::PlainLines;
 use rustix::event::{PollFd, PollFlags, Timespec, poll};
 use std::fmt;
 use std::io::Write;
-use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::mpsc::{Receiver, SyncSender, TrySendError, sync_channel};
 use std::sync::{Mutex, OnceLock, PoisonError};
 use std::time::{Duration, Instant};
@@ -29,6 +29,8 @@ const PATIENCE: Timespec = Timespec { tv_sec: 0, tv_nsec: 500_000_000 };
 const LOOK: Duration = Duration::from_millis(1);
 
 static QUEUE: OnceLock<Queue> = OnceLock::new();
+/// Somebody has waited for standard error in vain.
+static IN_VAIN: AtomicBool = AtomicBool::new(false);
 /// The other end of the queue, until the log's thread has it.
 static HELD: Mutex<Option<Receiver<Entry>>> = Mutex::new(None);
 
@@ -91,8 +93,18 @@ fn indented(text: fmt::Arguments<'_>) -> String {
     out + "\n"
 }
 
-/// Waits until everything that was said is written, but no longer than `patience`; returns whether it is.
+/// Waits until everything that was said is written, but no longer than `patience`, and not again once that was in vain; returns
+/// whether it is.
 pub fn flush(patience: Duration) -> bool {
+    if IN_VAIN.load(Ordering::Relaxed) {
+        return false;
+    }
+    let is_written = flushed(patience);
+    IN_VAIN.fetch_or(!is_written, Ordering::Relaxed);
+    is_written
+}
+
+fn flushed(patience: Duration) -> bool {
     let Some(queue) = QUEUE.get() else { return true };
     let until = Instant::now() + patience;
     let (send_done, done) = sync_channel(0);

@@ -3,6 +3,7 @@
 //! Every way in which this can fail has its own variant in [`AttachError`], whose message says what was
 //! found and what to do.
 
+use crate::far_address::FarAddress;
 use crate::handshake::{self, Answer, Request, RequestKind, Verdict};
 use crate::layout::{LAYOUT_HASH, MAGIC};
 use crate::peer::{Peer, ProcessWords};
@@ -10,8 +11,9 @@ use crate::segment::{self, CommanderMemory, DriverView, SegmentError};
 use crate::socket;
 use crate::socket_file;
 use crate::stop_socket::{self, Sent};
+use rustix::io::Errno;
 use rustix::net::sockopt::{Timeout, set_socket_timeout};
-use rustix::net::{AddressFamily, SocketAddrUnix, SocketFlags, SocketType};
+use rustix::net::{AddressFamily, SocketFlags, SocketType};
 use std::io;
 use std::os::fd::{AsFd, OwnedFd};
 use std::os::unix::fs::{MetadataExt, PermissionsExt};
@@ -409,12 +411,11 @@ fn group_in_words(id: u32) -> String {
 }
 
 fn connect(path: &Path) -> Result<OwnedFd, AttachError> {
-    let system = |what, errno: rustix::io::Errno| AttachError::System {
-        what,
-        socket: path.into(),
-        source: errno.into(),
-    };
-    let address = SocketAddrUnix::new(path).map_err(|errno| system("use the name", errno))?;
+    let system = |what, errno: Errno| AttachError::System { what, socket: path.into(), source: errno.into() };
+    let far = FarAddress::of(path).map_err(|errno| match errno {
+        Errno::NAMETOOLONG => system("use the name", errno),
+        other => connect_error(path, other),
+    })?;
     let socket =
         rustix::net::socket_with(AddressFamily::UNIX, SocketType::STREAM, SocketFlags::CLOEXEC, None)
             .map_err(|errno| system("open a socket", errno))?;
@@ -422,13 +423,12 @@ fn connect(path: &Path) -> Result<OwnedFd, AttachError> {
         set_socket_timeout(&socket, timeout, Some(ANSWER_TIMEOUT))
             .map_err(|errno| system("set a time-out on the socket", errno))?;
     }
-    rustix::io::retry_on_intr(|| rustix::net::connect(&socket, &address))
+    rustix::io::retry_on_intr(|| rustix::net::connect(&socket, &far.address))
         .map_err(|errno| connect_error(path, errno))?;
     Ok(socket)
 }
 
-fn connect_error(path: &Path, errno: rustix::io::Errno) -> AttachError {
-    use rustix::io::Errno;
+fn connect_error(path: &Path, errno: Errno) -> AttachError {
     let socket = path.to_path_buf();
     match errno {
         Errno::NOENT | Errno::NOTDIR => AttachError::NoDriver { socket },

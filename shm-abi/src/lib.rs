@@ -56,6 +56,7 @@ pub mod stop_socket;
 pub mod users;
 
 mod enumeration;
+mod far_address;
 mod socket;
 
 pub use command::{Command, CommandRefusal, DeviceCommand};

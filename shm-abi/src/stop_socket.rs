@@ -9,13 +9,14 @@
 //! before Linux 6.16 descriptors that come with it take as long to close as their sender likes (a TCP connection that
 //! lingers). It needs neither memory nor descriptors for it.
 
+use crate::far_address::FarAddress;
 use crate::socket_file::{self, BindError, SocketFile};
 use crate::users::known_user;
 use crate::{peer, users};
 use nix::cmsg_space;
 use nix::libc::ucred;
 use nix::sys::socket::{ControlMessageOwned, MsgFlags, recvmsg};
-use rustix::net::{AddressFamily, RecvFlags, SendFlags, SocketAddrUnix, SocketFlags, SocketType};
+use rustix::net::{AddressFamily, RecvFlags, SendFlags, SocketFlags, SocketType};
 use std::io::{self, IoSliceMut};
 use std::os::fd::AsRawFd;
 use std::os::unix::net::UnixDatagram;
@@ -52,10 +53,10 @@ pub fn send(socket: &Path) -> io::Result<Sent> {
 }
 
 fn send_beside(socket: &Path) -> io::Result<Sent> {
-    let address = SocketAddrUnix::new(path_beside(socket))?;
+    let far = FarAddress::of(&path_beside(socket))?;
     let sender =
         rustix::net::socket_with(AddressFamily::UNIX, SocketType::DGRAM, SocketFlags::CLOEXEC, None)?;
-    match rustix::net::sendto(&sender, b"stop", SendFlags::DONTWAIT | SendFlags::NOSIGNAL, &address) {
+    match rustix::net::sendto(&sender, b"stop", SendFlags::DONTWAIT | SendFlags::NOSIGNAL, &far.address) {
         Ok(_) => Ok(Sent::Queued),
         Err(rustix::io::Errno::AGAIN) => Ok(Sent::QueueFull),
         Err(errno) => Err(errno.into()),

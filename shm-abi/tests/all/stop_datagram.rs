@@ -2,6 +2,7 @@
 
 use patience::prelude::*;
 use patience::{limit, watched};
+use shm_abi::client::{self, AttachError};
 use shm_abi::server::Server;
 use shm_abi::stop_socket::{self, Sent, StopSocket, path_beside};
 use std::os::unix::fs::PermissionsExt;
@@ -95,6 +96,28 @@ fn a_driver_is_stopped_through_a_link_to_its_socket() {
     assert_eq!(stop_socket::send(&link).unwrap_err().kind(), std::io::ErrorKind::NotFound);
 }
 
+/// Names that no address has room for: of the socket itself, and of a link to it.
+#[test]
+fn a_driver_is_stopped_and_asked_by_a_path_of_any_length() {
+    let (directory, server, told) = listening();
+    let deep = "deep/".repeat(30);
+    std::fs::create_dir_all(directory.path().join(&deep)).unwrap();
+    let link = directory.path().join(&deep).join("link");
+    std::os::unix::fs::symlink(server.path(), &link).unwrap();
+    let name = server.path().file_name().unwrap();
+    let around = directory.path().join(&deep).join("../".repeat(30)).join(name);
+    for path in [&link, &around] {
+        assert_eq!(stop_socket::send(path).unwrap(), Sent::Queued, "{}", path.display());
+        assert!(told.recv_timeout(limit()).is_ok());
+        // It is reached, and hangs up or says nothing: nobody serves connections here.
+        let refused = client::stop(path, "test").unwrap_err();
+        assert!(!refused.to_string().contains("too long"), "{refused}");
+    }
+    let nobody = directory.path().join(&deep).join("nobody");
+    assert!(matches!(client::stop(&nobody, "test").unwrap_err(), AttachError::NoDriver { .. }));
+    assert!(client::stop(&nobody.join("further"), "test").is_err());
+}
+
 #[test]
 fn it_lies_beside_the_drivers_socket_for_the_same_people_and_goes_with_it() {
     let directory = tempfile::tempdir().unwrap();
@@ -127,7 +150,7 @@ fn a_file_at_its_place_is_left_alone() {
 #[test]
 fn a_program_that_stops_a_driver_whose_service_is_stuck_is_heard() {
     let (_directory, server, told) = listening();
-    shm_abi::client::emergency_stop(server.path(), "test").unwrap();
+    client::emergency_stop(server.path(), "test").unwrap();
     assert!(told.recv_timeout(limit()).is_ok());
 }
 
@@ -138,8 +161,5 @@ fn a_stop_that_the_queue_has_no_room_for_counts_only_when_the_driver_has_heard_i
     let server = Server::bind(&directory.path().join("driver.sock")).unwrap();
     let (_socket, _file) = StopSocket::bind(server.path()).unwrap();
     while stop_socket::send(server.path()).unwrap() == Sent::Queued {}
-    assert!(matches!(
-        shm_abi::client::emergency_stop(server.path(), "test"),
-        Err(shm_abi::client::AttachError::NoAnswer { .. })
-    ));
+    assert!(matches!(client::emergency_stop(server.path(), "test"), Err(AttachError::NoAnswer { .. })));
 }

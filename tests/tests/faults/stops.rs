@@ -316,22 +316,6 @@ fn a_driver_that_starts_while_nobody_reads_what_it_says_is_stopped_and_ends_as_a
     assert_eq!(refused.end().status, Some(2));
 }
 
-/// Nor has it a thread that would write.
-#[test]
-fn a_driver_that_cannot_start_says_why_however_few_files_it_may_open() {
-    let directory = tempfile::tempdir().expect("a directory");
-    let config = directory.path().join("driver.toml");
-    std::fs::write(&config, resting("real", 1)).expect("room");
-    for most in 5..20 {
-        let script = format!("ulimit -n {most}; exec \"$0\" \"$@\"");
-        let mut shell = programs::copied(Path::new("/bin/sh"));
-        shell.args(["-c", &script]).arg(programs::io_driver().get_program());
-        shell.arg("run").arg("--config").arg(&config).arg("--socket").arg(config.join("x.sock"));
-        let end = Running::start(&mut shell).end();
-        assert!(end.status == Some(2) && end.err.contains("io-driver: "), "{most}: {end:?}");
-    }
-}
-
 fn without_threads(command: &str, driver: &Driver) -> Command {
     let mut asking = programs::io_driver();
     asking.env("RUST_MIN_STACK", ENDLESS).args([command, "--socket"]).arg(driver.socket());
