@@ -38,6 +38,7 @@ pub mod on_request;
 pub mod outcome;
 mod outputs;
 pub mod passive_port;
+mod per_shape;
 pub mod picture;
 pub mod plausible;
 pub mod play;

@@ -3,8 +3,9 @@
 //! Model: the size of a thing is that of the box around it along its own axes; of a mesh by its vertices, of patches and of
 //! solids that are joined by the triangles that are drawn of them. A mesh that is only seen is not among what runs; its
 //! file is read for its vertices. The mass is the one that a run has, also where the
-//! scene gives a density.
+//! scene gives a density. What entities share is measured once.
 
+use crate::per_shape::PerShape;
 use crate::rig::Rig;
 use haptics::{Csg, Entity, Shape};
 use nalgebra::{Point3, Vector3};
@@ -42,25 +43,31 @@ impl Measures {
         for (index, mass_kg) in rig.masses(entities) {
             masses[index] = Some(mass_kg);
         }
-        let mut seen = SeenMeshes::default();
+        let mut measured = Measured::default();
         let pairs = rig.scene.entities.iter().zip(entities).zip(masses);
-        pairs.map(|((spec, entity), mass_kg)| Self::of(spec, entity, mass_kg, &mut seen)).collect()
+        pairs.map(|((spec, entity), mass_kg)| Self::of(spec, entity, mass_kg, &mut measured)).collect()
     }
 
-    fn of(spec: &SceneEntity, entity: &Entity, mass_kg: Option<f64>, seen: &mut SeenMeshes) -> Self {
+    fn of<'e>(
+        spec: &SceneEntity,
+        entity: &'e Entity,
+        mass_kg: Option<f64>,
+        measured: &mut Measured<'e>,
+    ) -> Self {
         let only_seen = match (&spec.shape, &entity.shape) {
             (ShapeSpec::Mesh(_), Shape::Mesh(_)) => None,
             (ShapeSpec::Mesh(mesh), _) => Some(mesh),
             _ => None,
         };
         let around = match only_seen {
-            Some(mesh) => seen.corners(mesh),
-            None => corners(&spec.shape, &entity.shape),
+            Some(mesh) => measured.seen.corners(mesh),
+            None => measured.felt.of(&entity.shape, || corners(&spec.shape, &entity.shape)),
         };
         let is_nothing = around.is_none() && matches!(&entity.shape, Shape::Csg(csg) if has_an_end(csg));
         let middle = around.map_or_else(Vector3::zeros, |[least, most]| 0.5 * (least + most));
         // A unit of density makes what the volume is.
-        let volume_m3 = mass_kg.and_then(|_| physics::MassProperties::of_density(&entity.shape, 1.0).ok());
+        let mass_of_one = || Some(physics::MassProperties::of_density(&entity.shape, 1.0).ok()?.mass_kg);
+        let volume_m3 = mass_kg.and_then(|_| measured.volumes_m3.of(&entity.shape, mass_of_one));
         Self {
             name: spec.name.clone(),
             kind: spec.shape.kind(),
@@ -70,7 +77,7 @@ impl Measures {
             is_nothing,
             middle_m: (spec.pose * Point3::from(middle)).coords.into(),
             mass_kg,
-            density_kg_m3: mass_kg.zip(volume_m3).map(|(mass_kg, of_one)| mass_kg / of_one.mass_kg),
+            density_kg_m3: mass_kg.zip(volume_m3).map(|(mass_kg, volume_m3)| mass_kg / volume_m3),
         }
     }
 
@@ -103,6 +110,15 @@ impl std::fmt::Display for Measures {
         }
         self.density_kg_m3.map_or(Ok(()), |density| write!(f, " ({} kg/m^3)", short(density)))
     }
+}
+
+/// What was measured so far.
+#[derive(Debug, Default)]
+struct Measured<'e> {
+    /// The boxes around what runs, in its own frame (m); `None`: it has no end.
+    felt: PerShape<'e, Option<[Vector3<f64>; 2]>>,
+    volumes_m3: PerShape<'e, Option<f64>>,
+    seen: SeenMeshes,
 }
 
 /// The boxes around meshes that are only seen (m), each file read once; `None`: it cannot be read, which is warned of.
@@ -176,6 +192,51 @@ pub(super) fn around(mut points: impl Iterator<Item = Vector3<f64>>) -> Option<[
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::rig::HandMode;
+    use std::path::Path;
+    use world::Scene;
+
+    /// A rig of a finger and these entities.
+    fn rig(entities: &str) -> Rig {
+        let file = Path::new("scene.toml");
+        let scene = Scene::parse(&format!("[[finger]]\nstart_m = [0, 1, 0]\n{entities}"), file).unwrap();
+        Rig::new(file, scene, None, None, HandMode::Kinematic, 1_000_000).unwrap()
+    }
+
+    /// A cube with a hole in it, of this name, and so much larger.
+    fn cube_with_hole(name: &str, scale: f64) -> String {
+        format!(
+            "[[entity]]\nname = \"{name}\"\nposition_m = [{}, 0, 0]\n\
+             shape = {{ kind = \"csg\", op = \"difference\", scale = {scale:?}, children = [\
+             {{ shape = {{ kind = \"box\", size_m = [0.1, 0.1, 0.1] }} }}, \
+             {{ shape = {{ kind = \"cylinder\", radius_m = 0.02, length_m = 0.2 }} }}] }}\n",
+            name.len()
+        )
+    }
+
+    #[test]
+    fn solids_that_are_alike_are_built_and_measured_once() {
+        let names = ["a", "bb", "ccc", "dddd"];
+        let alike: String = names.iter().map(|name| cube_with_hole(name, 1.0)).collect();
+        let rig = rig(&(alike + &cube_with_hole("other", 0.5)));
+        let step = rig.fast_step().unwrap();
+        let entities = step.entities();
+        // Such shapes are equal if they are the same one.
+        assert!(entities[1..4].iter().all(|entity| entity.shape == entities[0].shape));
+        assert!(entities[4].shape != entities[0].shape);
+        let mut measured = Measured::default();
+        let pairs = rig.scene.entities.iter().zip(entities);
+        let sizes: Vec<f64> = pairs
+            .filter_map(|(spec, entity)| Measures::of(spec, entity, None, &mut measured).length_m())
+            .collect();
+        assert_eq!(measured.felt.count(), 2);
+        // The grid of which a drawn solid is made finds faces to a billionth of its step.
+        let expected = [0.1, 0.1, 0.1, 0.1, 0.05];
+        assert!(
+            sizes.len() == 5 && sizes.iter().zip(expected).all(|(a, b)| (a - b).abs() < 1e-9),
+            "{sizes:?}"
+        );
+    }
 
     #[test]
     fn numbers_are_as_short_as_four_digits_allow() {

@@ -8,10 +8,13 @@
 use super::foxglove::{Rgba, WORLD, arrow, cube, cylinder, frame_in_world, scene_entity, sphere, triangles};
 use super::wire::Message;
 use crate::columns::Names;
+use crate::per_shape::PerShape;
 use crate::row::{BodyRow, FingerRow, Row};
 use haptics::{Entity, Shape};
 use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
 use std::f64::consts::TAU;
+use std::sync::Arc;
+use view::Triangles;
 use world::{Scene, ShapeSpec};
 
 /// Triangles of a mesh that are drawn at most: a picture for people, and a megabyte and a half of the file.
@@ -44,18 +47,8 @@ pub struct View {
 impl View {
     /// Of a scene, as it is rendered.
     pub fn new(scene: &Scene, entities: &[Entity]) -> Self {
-        let mut out = Message::new();
-        for (spec, entity) in scene.entities.iter().zip(entities) {
-            let moves = spec.motion.is_some();
-            let frame = if moves { frame_of(&spec.name) } else { WORLD.into() };
-            let pose = if moves { Isometry3::identity() } else { spec.pose };
-            let rgba = if moves { MOVING } else { SOLID };
-            scene_entity(&mut out, 0, &frame, &spec.name, |out| {
-                draw(out, &spec.shape, Some(entity), &pose, rgba);
-            });
-        }
         let radii_m = scene.fingers.iter().map(|finger| finger.radius_m).collect();
-        Self { scene: out.bytes().to_vec(), radii_m }
+        Self { scene: drawn(scene, entities, &mut Drawn::default()), radii_m }
     }
 
     /// A `foxglove.FrameTransforms` of all that moves.
@@ -100,6 +93,21 @@ impl View {
     }
 }
 
+/// A `foxglove.SceneUpdate` of all entities.
+fn drawn<'e>(scene: &Scene, entities: &'e [Entity], made: &mut Drawn<'e>) -> Vec<u8> {
+    let mut out = Message::new();
+    for (spec, entity) in scene.entities.iter().zip(entities) {
+        let moves = spec.motion.is_some();
+        let frame = if moves { frame_of(&spec.name) } else { WORLD.into() };
+        let pose = if moves { Isometry3::identity() } else { spec.pose };
+        let rgba = if moves { MOVING } else { SOLID };
+        scene_entity(&mut out, 0, &frame, &spec.name, |out| {
+            draw(out, &spec.shape, &entity.shape, made, (&pose, rgba));
+        });
+    }
+    out.bytes().to_vec()
+}
+
 /// What the surface is like where a finger of this radius touches it: the normal, and the friction circle in the tangent plane.
 fn touched(out: &mut Message, finger: &FingerRow, radius_m: f64) {
     let FingerRow { normal, god_object, hip, friction_radius_m, .. } = finger;
@@ -117,8 +125,17 @@ fn frame_of(object: &str) -> String {
     format!("object/{object}")
 }
 
-/// Draws a shape; `entity` has what files hold of it.
-fn draw(out: &mut Message, shape: &ShapeSpec, entity: Option<&Entity>, at: &Isometry3<f64>, rgba: Rgba) {
+/// Triangles made so far; `None`: a shape has none.
+type Drawn<'e> = PerShape<'e, Option<Arc<Triangles>>>;
+
+/// Draws a shape somewhere in a colour; `felt` has what files hold of it.
+fn draw<'e>(
+    out: &mut Message,
+    shape: &ShapeSpec,
+    felt: &'e Shape,
+    made: &mut Drawn<'e>,
+    (at, rgba): (&Isometry3<f64>, Rgba),
+) {
     match shape {
         ShapeSpec::Plane { normal, offset_m } => {
             let turned = UnitQuaternion::rotation_between(&Vector3::y(), normal)
@@ -143,30 +160,52 @@ fn draw(out: &mut Message, shape: &ShapeSpec, entity: Option<&Entity>, at: &Isom
                 sphere(out, &(at * Translation3::new(0.0, end, 0.0)), Vector3::repeat(2.0 * radius_m), rgba);
             }
         }
-        ShapeSpec::Mesh(_) => draw_mesh(out, entity, at, rgba),
-        other => draw_triangles(out, other, entity, at, rgba),
+        ShapeSpec::Mesh(_) => draw_mesh(out, felt, at, rgba),
+        // What has no form of its own there, as pictures have it.
+        other => {
+            let make = || view::shapes::triangles(other, Some(felt)).map(Arc::new);
+            if let Some(looks) = made.of(felt, make).filter(|looks| looks.corners.len() <= MOST_FACES) {
+                let places = looks.places.iter().map(|place| place.coords);
+                triangles(out, at, places, looks.corners.as_flattened(), rgba);
+            }
+        }
     }
 }
 
-/// What has no form of its own there, as pictures have it.
-fn draw_triangles(
-    out: &mut Message,
-    shape: &ShapeSpec,
-    entity: Option<&Entity>,
-    at: &Isometry3<f64>,
-    rgba: Rgba,
-) {
-    let Some(made) = view::shapes::triangles(shape, entity.map(|entity| &entity.shape)) else { return };
-    if made.corners.len() <= MOST_FACES {
-        triangles(out, at, made.places.iter().map(|place| place.coords), made.corners.as_flattened(), rgba);
-    }
-}
-
-fn draw_mesh(out: &mut Message, entity: Option<&Entity>, at: &Isometry3<f64>, rgba: Rgba) {
-    let Some(Shape::Mesh(mesh)) = entity.map(|entity| &entity.shape) else { return };
+fn draw_mesh(out: &mut Message, felt: &Shape, at: &Isometry3<f64>, rgba: Rgba) {
+    let Shape::Mesh(mesh) = felt else { return };
     if mesh.faces().len() > MOST_FACES {
         return;
     }
     let indices: Vec<u32> = mesh.faces().iter().flat_map(|face| face.vertices).collect();
     triangles(out, at, mesh.vertices().iter().copied(), &indices, rgba);
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::path::Path;
+    use world::CsgOp;
+
+    #[test]
+    fn the_triangles_of_a_solid_are_made_once_for_all_that_have_it() {
+        let entity = |name: &str| {
+            format!(
+                "[[entity]]\nname = \"{name}\"\nshape = {{ kind = \"csg\", op = \"union\", children = [\
+                 {{ shape = {{ kind = \"sphere\", radius_m = 0.05 }} }}] }}\n"
+            )
+        };
+        let text = format!("[[finger]]\n{}{}{}", entity("a"), entity("b"), entity("c"));
+        let scene = Scene::parse(&text, Path::new("scene.toml")).unwrap();
+        assert!(matches!(&scene.entities[0].shape, ShapeSpec::Csg(spec) if spec.op == CsgOp::Union));
+        let ball = haptics::Sphere::new(0.05).unwrap();
+        let csg = || Arc::new(haptics::Csg::build(&haptics::CsgTree::union([ball])).unwrap());
+        let entity = |csg: &Arc<_>| Entity::new(Arc::clone(csg), Isometry3::identity(), 1000.0).unwrap();
+        let (shared, own) = (csg(), csg());
+        let entities = [entity(&shared), entity(&shared), entity(&own)];
+        let mut made = Drawn::default();
+        let all = drawn(&scene, &entities, &mut made);
+        assert_eq!(made.count(), 2);
+        assert_eq!(all, drawn(&scene, &[entity(&own), entity(&own), entity(&own)], &mut Drawn::default()));
+    }
 }

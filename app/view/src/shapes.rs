@@ -33,7 +33,10 @@ pub fn triangles(spec: &ShapeSpec, model: Option<&Shape>) -> Option<Triangles> {
             frustum([*radius_bottom_m, *radius_top_m], *length_m)
         }
         ShapeSpec::Torus { ring_radius_m, tube_radius_m } => torus(*ring_radius_m, *tube_radius_m),
-        ShapeSpec::Scaled { shape, scale } => triangles(shape, None)?.scaled(&(*scale).into()),
+        // A model has its scale.
+        ShapeSpec::Scaled { shape, scale } if spec.is_closed_form() => {
+            triangles(shape, None)?.scaled(&(*scale).into())
+        }
         _ => modelled(model?)?,
     })
 }

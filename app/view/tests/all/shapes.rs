@@ -57,3 +57,13 @@ fn a_joined_solid_has_its_volume_and_its_sharp_edges() {
     let nearest = made.places.iter().map(|place| (place - corner).norm()).fold(f64::INFINITY, f64::min);
     assert!(nearest < 1e-6, "{nearest}");
 }
+
+#[test]
+fn a_joined_solid_that_is_scaled_looks_as_it_is_felt() {
+    let spec = CsgSpec { op: world::CsgOp::Union, children: Vec::new() };
+    let spec = ShapeSpec::Scaled { shape: Box::new(ShapeSpec::Csg(spec)), scale: [2.0, 1.0, 1.0] };
+    let part = CsgPart::from(Cuboid::new([0.1; 3]).unwrap()).scaled([2.0, 1.0, 1.0]);
+    let felt = Shape::Csg(Arc::new(Csg::build(&CsgTree::union([part])).unwrap()).into());
+    let made = triangles(&spec, Some(&felt)).expect("it is drawn");
+    assert!((made.volume_m3() / 2e-3 - 1.0).abs() < 2e-3, "{}", made.volume_m3());
+}
