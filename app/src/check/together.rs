@@ -4,7 +4,9 @@
 //! fields and guides have in common. There stiffness and damping add up as matrices, contacts along their normals,
 //! `K = sum k n n'`, effects as their [`Gains`]; masses of inertial fields as numbers. The largest eigenvalue is what the
 //! loop feels along its axis. Contacts are judged by what the loop stands, as single ones are; effects, and the damping of
-//! everything, by the [`Limits`] that single ones are refused above: each counts by its share of its own limit.
+//! everything, by the [`Limits`] that single ones are refused above: each counts by its share of its own limit. Forces of
+//! constant fields add up as vectors, and vibrations with their amplitudes along the normals, to and fro; their sum is judged by
+//! what one field may pull.
 //! Cost: some hundred places for each thing that others reach into, and none for things that lie apart; of heaps, one in so many
 //! of these that all things are touched [`MOST_LOOKS`] times or less, which is told; of effects, as many groups as there are
 //! effects, or pairs of a few.
@@ -14,7 +16,9 @@
 use super::common_places::{Effect, common_places};
 use super::warnings::Stands;
 use crate::rig::{Rig, in_words};
-use haptics::{Entity, Field, FieldKind, Finger, Gains, Guide, Hip, Limits, Shape, Surface, WORLD};
+use haptics::{
+    Entity, Field, FieldKind, Finger, Gains, Guide, Hip, Limits, MOST_FORCE_N, Shape, Surface, WORLD,
+};
 use nalgebra::{Matrix3, Vector3};
 use physics::collide::bounding_ball;
 use std::collections::BTreeMap;
@@ -71,6 +75,7 @@ enum Kind {
     Stiffness,
     Damping,
     Mass,
+    Force,
 }
 
 /// A sum at a place, along its largest axis.
@@ -80,6 +85,16 @@ struct Sum {
     value: f64,
     limit: f64,
     place_W: Vector3<f64>,
+}
+
+/// Things that a finger touches at a place, and those that act on it without.
+#[derive(Debug, Default)]
+struct Touched {
+    contacts: Vec<(usize, Gains)>,
+    /// Of entities that draw it.
+    magnets: Vec<(usize, Gains)>,
+    /// Amplitudes along the normals of what is touched (N).
+    vibrations: Vec<(usize, Vector3<f64>)>,
 }
 
 /// The largest of each kind and group of things.
@@ -118,11 +133,12 @@ impl<'a> World<'a> {
         found: &mut Found,
     ) {
         let effects = self.effects_at(place_W);
+        let pulls = self.pulls_at(place_W);
         let magnets = near.iter().filter(|&&at| self.entities[at as usize].magnetism.is_some()).count();
-        if near.len() + effects.len() + magnets < 2 {
+        if near.len() + effects.len() + pulls.len() + magnets < 2 {
             return;
         }
-        let (contacts, magnets) = self.touched((near, space), radius_m, place_W);
+        let Touched { contacts, magnets, vibrations } = self.touched((near, space), radius_m, place_W);
         let (_, of_fields, of_guides) = &self.limits;
         let mut add = |kind, sum: Option<(Vec<usize>, f64, f64)>| {
             if let Some((things, value, limit)) = sum {
@@ -153,6 +169,7 @@ impl<'a> World<'a> {
             Some((*thing, mass, limit_of(*thing).mass_kg(*cutoff_hz)))
         };
         add(Kind::Mass, beyond(&effects.iter().filter_map(mass).collect::<Vec<_>>()));
+        add(Kind::Force, of_forces(&pulls, &vibrations));
     }
 
     /// Fields and guides that are felt at a place.
@@ -163,15 +180,17 @@ impl<'a> World<'a> {
         all.filter(|(_, gains)| *gains != Gains::default()).collect()
     }
 
-    /// Contacts of a finger there, and magnets that draw it without one.
-    #[expect(clippy::type_complexity)]
-    fn touched(
-        &self,
-        (near, space): (&[u32], u32),
-        radius_m: f64,
-        place_W: &Vector3<f64>,
-    ) -> (Vec<(usize, Gains)>, Vec<(usize, Gains)>) {
-        let Ok(probe) = Finger::new(radius_m, near.len()) else { return Default::default() };
+    /// Forces of constant fields at a place (N).
+    fn pulls_at(&self, place_W: &Vector3<f64>) -> Vec<(usize, Vector3<f64>)> {
+        let pulls = self.fields.iter().enumerate().filter_map(|(at, field)| {
+            let FieldKind::Constant { force_W } = field.kind() else { return None };
+            Some((self.entities.len() + at, force_W * field.region().weight(place_W)))
+        });
+        pulls.filter(|(_, pull_W)| *pull_W != Vector3::zeros()).collect()
+    }
+
+    fn touched(&self, (near, space): (&[u32], u32), radius_m: f64, place_W: &Vector3<f64>) -> Touched {
+        let Ok(probe) = Finger::new(radius_m, near.len()) else { return Touched::default() };
         let mut probe = probe.within(space);
         probe.step_near(self.entities, near, Hip { position_W: *place_W, velocity_W: None }, 1e-3);
         let contacts = probe.contacts().map(|contact| {
@@ -184,9 +203,17 @@ impl<'a> World<'a> {
             };
             (contact.entity, gains)
         });
+        let vibrations = probe.contacts().filter_map(|contact| {
+            let vibration = self.entities[contact.entity].vibration?;
+            Some((contact.entity, contact.normal_W * vibration.amplitude_n()))
+        });
         let magnets = near.iter().map(|&at| at as usize).filter(|&at| probe.contact(at).is_none());
         let magnets = magnets.map(|at| (at, self.entities[at].magnet_gains_at(place_W, radius_m)));
-        (contacts.collect(), magnets.filter(|(_, gains)| *gains != Gains::default()).collect())
+        Touched {
+            contacts: contacts.collect(),
+            magnets: magnets.filter(|(_, gains)| *gains != Gains::default()).collect(),
+            vibrations: vibrations.collect(),
+        }
     }
 
     /// Places that several effects have in common with each other and with entities.
@@ -233,6 +260,27 @@ fn beyond(all: &[(usize, Matrix3<f64>, f64)]) -> Option<(Vec<usize>, f64, f64)> 
     let things = taking_part(all.iter().map(part))?;
     let value: f64 = all.iter().map(|(_, gain, _)| along(gain)).sum();
     (share > 1.0 + ROUNDING).then_some((things, value, value / share))
+}
+
+/// The largest sum of pulls and of vibrations, each of which may push or pull at a time, with what one field may pull.
+fn of_forces(
+    pulls: &[(usize, Vector3<f64>)],
+    vibrations: &[(usize, Vector3<f64>)],
+) -> Option<(Vec<usize>, f64, f64)> {
+    let steady_W: Vector3<f64> = pulls.iter().map(|(_, pull_W)| pull_W).sum();
+    // A sum of what goes along the sum before it is no smaller.
+    let larger = |sum_W: Vector3<f64>| {
+        let swings = vibrations.iter().map(|(_, swing_W)| swing_W * swing_W.dot(&sum_W).signum());
+        steady_W + swings.sum::<Vector3<f64>>()
+    };
+    let begins = vibrations.iter().flat_map(|(_, swing_W)| [*swing_W, -swing_W]).chain([steady_W]);
+    let sums = begins.map(|begin_W| (0..ROUNDS).fold(begin_W, |sum_W, _| larger(sum_W)));
+    let sum_W = sums.max_by(|a, b| a.norm().total_cmp(&b.norm()))?;
+    let (value, along_W) = (sum_W.norm(), sum_W.try_normalize(0.0)?);
+    let steady = pulls.iter().map(|(thing, pull_W)| (*thing, pull_W.dot(&along_W)));
+    let swinging = vibrations.iter().map(|(thing, swing_W)| (*thing, swing_W.dot(&along_W).abs()));
+    let things = taking_part(steady.chain(swinging))?;
+    (value > MOST_FORCE_N * (1.0 + ROUNDING)).then_some((things, value, MOST_FORCE_N))
 }
 
 /// Largest eigenvalue, with its axis; `None` where there is none above 0.
@@ -312,6 +360,11 @@ impl Kind {
             Self::Mass => {
                 format!(
                     "{names} together may swing: {there} {value:.2} kg of them, and {limit:.2} are stable"
+                )
+            }
+            Self::Force => {
+                format!(
+                    "{names} together may pull too hard: {there} {value:.1} N of them, and one field may have {limit:.1}"
                 )
             }
         }
@@ -405,6 +458,8 @@ const BELOW_M: f64 = 1e-3;
 const ABOVE: f64 = 0.01;
 /// Of what adds most along an axis: what adds less is not named.
 const TAKES_PART: f64 = 0.05;
+/// Of making a sum of forces larger.
+const ROUNDS: usize = 8;
 /// Of shares that are 1 together by what a scene says.
 const ROUNDING: f64 = 1e-9;
 const MOST_TOLD: usize = 10;
@@ -416,6 +471,30 @@ const MOST_LOOKS: usize = 60_000;
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn vibrations_count_along_their_normals_in_whichever_way_makes_the_sum_larger() {
+        let along = |thing: usize, x: f64, y: f64| (thing, Vector3::new(x, y, 0.0));
+        let value = |pulls: &[_], vibrations: &[_]| of_forces(pulls, vibrations).map(|(_, value, _)| value);
+        assert_eq!(value(&[along(0, 9.0, 0.0), along(1, -9.0, 0.0)], &[]), None);
+        assert_eq!(value(&[along(0, 6.0, 0.0), along(1, 0.0, 8.0)], &[]), None, "10 N are allowed");
+        assert_eq!(value(&[], &[along(0, 9.0, 0.0), along(1, -9.0, 0.0)]), Some(18.0));
+        assert_eq!(value(&[along(0, -9.0, 0.0)], &[along(1, 0.0, 12.0)]), Some(15.0));
+        // Every choice of signs beside it.
+        let swings: Vec<_> = (0..9)
+            .map(|at| along(at, (at as f64 * 1.7).sin() * 4.0, (at as f64 * 2.3).cos() * 4.0))
+            .collect();
+        let signed = |signs: u32| -> Vector3<f64> {
+            swings.iter().map(|(at, swing)| if signs >> at & 1 == 0 { *swing } else { -swing }).sum()
+        };
+        let most = (0..1 << 9).map(|signs| signed(signs).norm()).fold(0.0, f64::max);
+        let found = value(&[], &swings).unwrap_or(0.0);
+        assert!((found - most).abs() < 1e-12 * most, "{found} {most}");
+        // What does not take part is not named, and one by itself is not told here.
+        let told = of_forces(&[along(7, 9.0, 0.0), along(8, 9.0, 0.0), along(9, -1.0, 0.0)], &[]);
+        assert_eq!(told.map(|(things, ..)| things), Some(vec![7, 8]));
+        assert_eq!(value(&[], &[along(0, 50.0, 0.0)]), None);
+    }
 
     #[test]
     fn of_heaps_so_many_places_are_looked_at_that_the_looks_are_bounded() {

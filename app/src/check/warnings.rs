@@ -6,7 +6,7 @@ use crate::study::stiffness::bounds::Theory;
 use crate::study::stiffness::case::{Axis, Case, Hand, Mode};
 use crate::study::stiffness::search::Found;
 use crate::study::stiffness::trial::Bench;
-use haptics::{Door, Entity, Finger, Hip, Limits, Passage, SLAB_M};
+use haptics::{Door, Entity, Finger, Hip, Limits, MOST_FORCE_N, Passage, SLAB_M};
 use io_driver::sim::hand::model_file::Firmness;
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -18,6 +18,7 @@ pub(super) fn all(rig: &Rig, whole: &Scene, entities: &[Entity]) -> Vec<String> 
     let mut stands = Stands::of(rig);
     let mut warnings = too_stiff(rig, &mut stands);
     warnings.extend(too_damped(rig));
+    warnings.extend(too_loud(rig));
     warnings.extend(together::too_much(rig, entities, &mut stands));
     let pairs = near::pairs(rig, entities);
     warnings.extend(contacts::all(rig, entities, &pairs));
@@ -103,6 +104,22 @@ fn too_damped(rig: &Rig) -> Option<String> {
     (!names.is_empty()).then(|| {
         format!(
             "{} may swing: at {rate_hz} Hz a damping of {limit:.1} N s/m is stable on a device of {mass_kg} kg at its tip",
+            in_words(&names)
+        )
+    })
+}
+
+/// By what one field may pull.
+fn too_loud(rig: &Rig) -> Option<String> {
+    let felt = rig.scene.entities.iter().filter(|entity| entity.is_haptic);
+    let beyond = felt.filter_map(|entity| {
+        let amplitude_n = entity.vibration.as_ref()?.amplitude_n;
+        (amplitude_n > MOST_FORCE_N).then(|| format!("{} ({amplitude_n} N)", entity.name))
+    });
+    let names: Vec<String> = beyond.collect();
+    (!names.is_empty()).then(|| {
+        format!(
+            "{} may hum too hard: a vibration of more than {MOST_FORCE_N:.1} N is more than a desktop device renders",
             in_words(&names)
         )
     })

@@ -361,6 +361,51 @@ fn check_judges_effects_and_contacts_together() {
     assert!(told.iter().any(|it| it.starts_with("ball, other together may swing")), "{told:?}");
 }
 
+#[test]
+fn check_judges_constant_forces_and_vibrations_on_the_sum_at_a_place() {
+    let none: [String; 0] = [];
+    let wind = |force: &str, x: f64| {
+        format!(
+            "[[field]]\nkind = \"constant\"\nforce_n = {force}\nposition_m = [{x}, 0.0, 0.0]\n\
+             shape = {{ kind = \"box\", size_m = [0.1, 0.1, 0.1] }}\n"
+        )
+    };
+    assert_eq!(warnings(&wind("[9.0, 0.0, 0.0]", 0.0)), none);
+    let told = warnings(&wind("[9.0, 0.0, 0.0]", 0.0).repeat(10));
+    assert_eq!(told.len(), 1, "{told:?}");
+    assert!(told[0].starts_with("field[0], field[1], field[2],"), "{told:?}");
+    assert!(told[0].contains("together may pull too hard: a finger at ("), "{told:?}");
+    assert!(told[0].ends_with("feels 90.0 N of them, and one field may have 10.0"), "{told:?}");
+    // Side by side they are felt one by one, and against each other they are nothing.
+    assert_eq!(warnings(&(wind("[9.0, 0.0, 0.0]", 0.0) + &wind("[9.0, 0.0, 0.0]", 0.1))), none);
+    assert_eq!(warnings(&(wind("[9.0, 0.0, 0.0]", 0.0) + &wind("[-9.0, 0.0, 0.0]", 0.0))), none);
+    let plate = |name: &str, amplitude: f64, place: &str| {
+        format!(
+            "[[entity]]\nname = \"{name}\"\nposition_m = {place}\nstiffness_n_per_m = 100.0\n\
+             shape = {{ kind = \"box\", size_m = [0.1, 0.02, 0.1] }}\n\
+             vibration = {{ frequency_hz = 100.0, amplitude_n = {amplitude:?}, full_load_n = {amplitude:?} }}\n"
+        )
+    };
+    let layers = |amplitude: f64| -> String {
+        (0..10).map(|at| plate(&format!("p{at}"), amplitude, "[0.0, 0.0, 0.0]")).collect()
+    };
+    assert_eq!(warnings(&layers(0.9)), none);
+    let told = warnings(&layers(9.0));
+    assert_eq!(told.len(), 1, "{told:?}");
+    assert!(told[0].starts_with("p0, p1, p2,") && told[0].contains("feels 90.0 N of them"), "{told:?}");
+    // A field and what is touched in it.
+    let told = warnings(&(plate("plate", 9.0, "[0.0, 0.0, 0.0]") + &wind("[0.0, -9.0, 0.0]", 0.0)));
+    assert!(told.len() == 1 && told[0].starts_with("plate, field[0] together may pull too hard"), "{told:?}");
+    assert!(told[0].contains("feels 18.0 N of them"), "{told:?}");
+    assert_eq!(
+        warnings(&(plate("plate", 9.0, "[0.3, 0.0, 0.0]") + &wind("[0.0, -9.0, 0.0]", 0.0))),
+        none,
+        "apart"
+    );
+    let told = warnings(&plate("plate", 12.0, "[0.0, 0.0, 0.0]"));
+    assert!(told.len() == 1 && told[0].starts_with("plate (12 N) may hum too hard"), "{told:?}");
+}
+
 /// Nothing falls.
 const WEIGHTLESS: &str = "gravity_m_s2 = [0.0, 0.0, 0.0]\n";
 
