@@ -41,6 +41,7 @@ mod fan;
 mod fit;
 mod fold;
 mod hole;
+mod inner_wall;
 mod junction;
 mod labels;
 mod ledge;
