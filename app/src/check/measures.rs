@@ -103,7 +103,9 @@ impl std::fmt::Display for Measures {
             None if self.is_nothing => write!(f, ", nothing is left of it")?,
             None => write!(f, ", size not measured")?,
         }
-        let [x, y, z] = self.middle_m.map(short);
+        // Triangles of solids that are drawn lie beside their places by roundings.
+        let least_m = ROUNDING * self.length_m().unwrap_or(0.0);
+        let [x, y, z] = self.middle_m.map(|x_m| short(if x_m.abs() < least_m { 0.0 } else { x_m }));
         write!(f, ", at ({x}, {y}, {z}) m")?;
         if let Some(mass_kg) = self.mass_kg {
             write!(f, ", {} kg", short(mass_kg))?;
@@ -143,6 +145,9 @@ fn has_an_end(csg: &Csg) -> bool {
 
 /// Extents away, where only what has no end is.
 const FAR: f64 = 1e3;
+
+/// Of a thing's length.
+const ROUNDING: f64 = 1e-9;
 
 /// Four digits.
 pub(super) fn short(number: f64) -> String {
@@ -226,9 +231,9 @@ mod tests {
         assert!(entities[4].shape != entities[0].shape);
         let mut measured = Measured::default();
         let pairs = rig.scene.entities.iter().zip(entities);
-        let sizes: Vec<f64> = pairs
-            .filter_map(|(spec, entity)| Measures::of(spec, entity, None, &mut measured).length_m())
-            .collect();
+        let all: Vec<Measures> =
+            pairs.map(|(spec, entity)| Measures::of(spec, entity, None, &mut measured)).collect();
+        let sizes: Vec<f64> = all.iter().filter_map(Measures::length_m).collect();
         assert_eq!(measured.felt.count(), 2);
         // The grid of which a drawn solid is made finds faces to a billionth of its step.
         let expected = [0.1, 0.1, 0.1, 0.1, 0.05];
@@ -236,6 +241,7 @@ mod tests {
             sizes.len() == 5 && sizes.iter().zip(expected).all(|(a, b)| (a - b).abs() < 1e-9),
             "{sizes:?}"
         );
+        assert_eq!(all[0].to_string(), "a: csg, 0.1 x 0.1 x 0.1 m, at (1, 0, 0) m");
     }
 
     #[test]
