@@ -52,6 +52,7 @@ mod mesh_see;
 mod mesh_share;
 mod mesh_solid;
 mod mesh_span;
+mod mesh_spread;
 mod overlay;
 mod rim;
 mod ring;
@@ -61,6 +62,7 @@ mod spots;
 pub use bounds::bounding_ball;
 pub(crate) use mesh_patch::Searched;
 pub use mesh_patch::{Patch, Patches};
+pub(crate) use mesh_spread::Spread;
 use spots::{Spot, Spots};
 
 /// The most contact points of two entities.
@@ -145,6 +147,8 @@ pub struct PairMemory {
     pub words: [f64; 8],
     /// Of a mesh, where it touches.
     pub patches: Patches,
+    /// Points are so soft that energy in them can be felt: of a mesh on a plane all vertices count.
+    pub is_soft: bool,
 }
 
 /// The vertices that a mesh stands on, and how it stood when they were chosen.

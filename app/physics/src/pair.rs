@@ -144,6 +144,7 @@ impl Pair {
         }
         self.remembers = true;
         let (in_A, in_B) = (Solid { shape: &a.shape, X_W: &a.X_WB }, Solid { shape: &b.shape, X_W: &b.X_WB });
+        self.memory.is_soft = self.surfacing.is_as_felt() && start.is_implicit;
         let mut found = ContactPoints::default();
         contact_points(in_A, in_B, reach_m, &mut self.memory, &mut found);
         if rows.len() > *most_rows / 2 {
@@ -152,12 +153,12 @@ impl Pair {
         }
         let poses = [[&a.X_WB, &b.X_WB], [&a.previous_X_WB, &b.previous_X_WB]];
         let begins = self.count == 0;
-        let deep = if self.surfacing.deepest_rest_m().is_finite() {
-            Deep { from_m: reach_m.min(self.surfacing.deepest_rest_m()), presses_m: 0.0 }
-        } else {
+        let deep = if self.surfacing.is_as_felt() {
             // Soft things may rest so deep.
             let presses_m = reach_m.max(self.throws_m(LET_OUT_M_S, start));
             Deep { from_m: presses_m, presses_m }
+        } else {
+            Deep { from_m: reach_m.min(self.surfacing.deepest_rest_m()), presses_m: 0.0 }
         };
         self.carry(&found, poses, deep, speed_m_s * start.dt_s, last);
         let pressed = self.anchors[..self.count].iter().filter(|anchor| anchor.is_pressed()).count();
@@ -368,6 +369,10 @@ impl Pair {
             worked_j += row.torque_W().dot(&spin_W(row, end.motions)) * end.dt_s;
         }
         self.ledger.enter(worked_j);
+        if self.memory.patches.spread.is_crowded() {
+            let squares = self.anchors[..self.rows].iter().map(|anchor| anchor.worked.iter().sum::<f64>());
+            self.ledger.lose_beyond(0.5 * stiffness_n_per_m * squares.sum::<f64>());
+        }
         if presses && self.ledger.owes() {
             for body in self.moving(end).into_iter().flatten() {
                 let refunded_j = spare_j[body].max(0.0);

@@ -162,9 +162,14 @@ impl Mesh {
     }
 
     /// Visits the vertices at which none of at most six limits is negative, as corners of faces, each as often as faces meet
-    /// there, until `visit` says `false`; says whether all were visited, of which there may be too many for a tick.
-    pub fn for_each_vertex_within(&self, limits: &[Linear], visit: impl FnMut(u32) -> bool) -> bool {
-        self.bvh.for_each_vertex_within(self.triangles(), limits, visit)
+    /// there, until `visit` says `false`, or so many nodes and runs of faces were looked at; says whether all were visited.
+    pub fn for_each_vertex_within(
+        &self,
+        limits: &[Linear],
+        visit: impl FnMut(u32) -> bool,
+        most_visits: usize,
+    ) -> bool {
+        self.bvh.for_each_vertex_within(self.triangles(), limits, visit, most_visits)
     }
 
     /// Visits the numbers of the faces in all boxes to which `key_of` gives a key by their middle and half their size, smallest

@@ -60,10 +60,11 @@ fn vertices_within_limits_are_visited_all_and_no_others() {
             let mut linear = || Linear::new(noise.vector(1.0), noise.vector(0.1).x);
             let limits = [linear(), linear(), linear()];
             let mut visited = vec![false; mesh.vertices().len()];
-            let all = mesh.for_each_vertex_within(&limits, |corner| {
+            let visit = |corner| {
                 visited[mesh.faces()[(corner / 3) as usize].vertices[(corner % 3) as usize] as usize] = true;
                 true
-            });
+            };
+            let all = mesh.for_each_vertex_within(&limits, visit, 256);
             for (vertex, visited) in mesh.vertices().iter().zip(visited) {
                 let counts = limits.iter().all(|limit| limit.at(vertex) >= 0.0);
                 // Only where there was too much to look at may any be missing.
@@ -76,9 +77,9 @@ fn vertices_within_limits_are_visited_all_and_no_others() {
 #[test]
 fn too_much_to_look_at_is_said() {
     let (mesh, _) = Mesh::build(make::uv_sphere(100, 51, 0.1)).unwrap();
-    assert!(!mesh.for_each_vertex_within(&[Linear::ONE], |_| true));
-    assert!(mesh.for_each_vertex_within(&[Linear::new(Vector3::y(), -0.0999)], |_| true));
-    assert!(!mesh.for_each_vertex_within(&[Linear::new(Vector3::y(), -0.0999)], |_| false));
+    assert!(!mesh.for_each_vertex_within(&[Linear::ONE], |_| true, 256));
+    assert!(mesh.for_each_vertex_within(&[Linear::new(Vector3::y(), -0.0999)], |_| true, 256));
+    assert!(!mesh.for_each_vertex_within(&[Linear::new(Vector3::y(), -0.0999)], |_| false, 256));
 }
 
 #[test]

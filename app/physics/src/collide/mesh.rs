@@ -77,12 +77,13 @@ fn against(
     mut told: Told<'_>,
 ) {
     let X_MO = told.X_WM.inv_mul(X_WO);
+    if let Some((normal_O, offset_m)) = mesh_plane::plane_below(mesh, other, &X_MO, memory.is_soft) {
+        let normal_M = X_MO * normal_O;
+        let offset_m = offset_m + normal_M.dot(&X_MO.translation.vector);
+        mesh_plane::contact_points(mesh, &normal_M, offset_m, reach_m, memory, &mut told);
+        return;
+    }
     match other {
-        Shape::Form(Form::Plane(plane)) => {
-            let normal_M = X_MO * plane.normal_B();
-            let offset_m = plane.offset_m() + normal_M.dot(&X_MO.translation.vector);
-            mesh_plane::contact_points(mesh, &normal_M, offset_m, reach_m, memory, &mut told);
-        }
         Shape::Form(Form::Sphere(sphere)) => {
             let ball = Ball { centre_M: X_MO.translation.vector, radius_m: sphere.radius_m() };
             mesh_ball::contact_points(mesh, &ball, reach_m, memory, &mut told);

@@ -8,6 +8,7 @@ use nalgebra::{Isometry3, Vector3};
 
 use super::Stands;
 use super::mesh_found::Carried;
+use super::mesh_spread::Spread;
 
 /// The most places of a pair: the sides of a box inside another one.
 pub(super) const MAX_PATCHES: usize = 6;
@@ -35,6 +36,8 @@ pub struct Patches {
     pub(super) all: [Patch; MAX_PATCHES],
     /// What they are was found by a search from here.
     pub(super) searched: Option<Searched>,
+    /// Of a soft mesh on a plane, about which vertices others are grouped.
+    pub(crate) spread: Spread,
 }
 
 /// What a search has seen.

@@ -80,11 +80,7 @@ impl Standing<'_> {
     fn all_of_few(&self) -> Option<Chosen> {
         let mut all: Chosen = [None; PATCH_POINTS];
         let mut count = 0;
-        let mut limits = [self.below(self.reach_m); MAX_LIMITS];
-        let given = self.limits.len().min(MAX_LIMITS - 1);
-        limits[1..=given].copy_from_slice(&self.limits[..given]);
-        let are_few = self.mesh.for_each_vertex_within(&limits[..=given], |corner| {
-            let corner = Corner::new(corner);
+        let see = |corner: Corner| {
             let vertex = corner.vertex(self.mesh);
             if all[..count].iter().flatten().any(|one| one.vertex(self.mesh) == vertex) {
                 return true;
@@ -93,8 +89,18 @@ impl Standing<'_> {
             *place = Some(corner);
             count += 1;
             true
-        });
+        };
+        let are_few = self.for_each_low(see, MANY_VISITS);
         are_few.then_some(all)
+    }
+
+    /// Visits all within reach, each as often as faces meet there, until `visit` says `false` or there is too much to look at; says
+    /// whether all were visited.
+    pub(super) fn for_each_low(&self, mut visit: impl FnMut(Corner) -> bool, most_visits: usize) -> bool {
+        let mut limits = [self.below(self.reach_m); MAX_LIMITS];
+        let given = self.limits.len().min(MAX_LIMITS - 1);
+        limits[1..=given].copy_from_slice(&self.limits[..given]);
+        self.mesh.for_each_vertex_within(&limits[..=given], |corner| visit(Corner::new(corner)), most_visits)
     }
 
     /// Those that have a role, and as many of the last tick as there is room for.

@@ -3,7 +3,7 @@
 //! Invariant: who gets all of it in order goes on as the one that gave it, to the bit; what is not sent is not read.
 
 use super::{Anchor, Ledger, MAX_POINTS, Pair, Surfacing};
-use crate::collide::{Patch, Patches, Searched};
+use crate::collide::{Patch, Patches, Searched, Spread};
 
 /// What every pair has.
 #[derive(Debug, Clone, Copy)]
@@ -12,6 +12,7 @@ pub(crate) struct Head {
     surfacing: Surfacing,
     words: [f64; 8],
     searched: Option<Searched>,
+    spread: Spread,
     ledger: Ledger,
     count: u32,
     remembers: bool,
@@ -30,6 +31,7 @@ impl Pair {
             surfacing: self.surfacing,
             words: self.memory.words,
             searched: self.patches().and_then(Patches::searched),
+            spread: self.patches().map_or_else(Spread::default, |patches| patches.spread),
             ledger: self.ledger,
             count: self.count as u32,
             remembers: self.remembers,
@@ -46,6 +48,7 @@ impl Pair {
         self.memory.words = head.words;
         if head.has_mesh {
             self.memory.patches.go_on_from(head.searched);
+            self.memory.patches.spread = head.spread;
         }
     }
 

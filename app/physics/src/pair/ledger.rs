@@ -67,6 +67,12 @@ impl Ledger {
         self.held_j -= if work_j.is_finite() { work_j } else { 0.0 };
     }
 
+    /// Loses a part of what it holds beyond this \[J\], of what dampers and friction took: where points stand for others that come and
+    /// go, all of it would be spent on them, and what rocks would rock for ever.
+    pub(super) fn lose_beyond(&mut self, worked_j: f64) {
+        self.held_j -= LOST * (self.held_j - worked_j).max(0.0);
+    }
+
     /// Pays what a body owes, as far as it goes; says what is left of that \[J\].
     pub(super) fn pay(&mut self, owed_j: f64) -> f64 {
         let paid_j = owed_j.min(self.held_j.max(0.0));
@@ -174,6 +180,8 @@ impl Allowed {
 /// Along the normal, across it and in turning.
 pub(super) const MAX_SPRINGS: usize = SPRINGS_OF_POINT * MAX_POINTS;
 pub(super) const SPRINGS_OF_POINT: usize = 3;
+/// Part of what is held beyond what was worked that is lost in a tick.
+const LOST: f64 = 0.1;
 /// Of sums of so many squares.
 const ROUNDING: f64 = 1e-14;
 

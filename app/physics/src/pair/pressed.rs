@@ -58,6 +58,10 @@ pub(super) fn row(
     let is_asked_for = surfacing.damping.is_ratio() || surfacing.response.restitution().is_some();
     let gives_per_kg = if is_asked_for { gives_per_kg(&row, start) } else { 0.0 };
     row.damping = row.stiffness.map(|k| surfacing.damping.n_s_per_m(k, gives_per_kg));
+    if !surfacing.damping.is_ratio() {
+        // A point that stands for many has the dampers of all.
+        row.damping[0] *= anchor.share.max(1.0);
+    }
     let [b, b_across] = row.damping;
     // So large that velocities are what is wanted. Nothing can be stopped that nothing moves.
     let stop = if gives_per_kg > 0.0 { HARD / (gives_per_kg * dt_s) } else { 0.0 };

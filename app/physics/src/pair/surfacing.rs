@@ -56,7 +56,12 @@ pub struct Surfacing {
 impl Surfacing {
     /// Things that rest on each other are no deeper \[m\]: what is found deeper was placed there, and its spring would throw it.
     pub(crate) fn deepest_rest_m(&self) -> f64 {
-        if self.damping.is_ratio() { DEEPEST_REST_M } else { f64::INFINITY }
+        if self.is_as_felt() { f64::INFINITY } else { DEEPEST_REST_M }
+    }
+
+    /// Whether points are as soft as fingers feel both.
+    pub(crate) fn is_as_felt(&self) -> bool {
+        !self.damping.is_ratio()
     }
 
     /// Of two entities.

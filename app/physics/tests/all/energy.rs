@@ -64,7 +64,8 @@ fn overlap_j(world: &World) -> f64 {
             let reach_m = 1e-3 + (fastest(a) + fastest(b)) * DT;
             let surfacing = Surfacing::between(&world.entities[a], &world.entities[b], &Contacts::default());
             let mut found = ContactPoints::default();
-            contact_points(solid(a), solid(b), reach_m, &mut PairMemory::default(), &mut found);
+            let mut memory = PairMemory { is_soft: true, ..PairMemory::default() };
+            contact_points(solid(a), solid(b), reach_m, &mut memory, &mut found);
             let squares: f64 = found.as_slice().iter().map(|p| p.share * p.depth_m().powi(2)).sum();
             all_j += 0.5 * surfacing.stiffness_n_per_m * squares;
         }

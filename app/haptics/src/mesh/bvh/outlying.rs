@@ -156,12 +156,13 @@ impl<const WIDTH: usize> Bvh<WIDTH> {
     }
 
     /// Visits the vertices at which no limit is negative, as corners of faces, each as often as faces meet there, until
-    /// `visit` says `false`; says whether all were visited.
+    /// `visit` says `false`, or so many nodes and runs of faces were looked at; says whether all were visited.
     pub fn for_each_vertex_within(
         &self,
         triangles: Triangles<'_>,
         limits: &[Linear],
         mut visit: impl FnMut(u32) -> bool,
+        most_visits: usize,
     ) -> bool {
         let extent_m = self.extent_m();
         let limits = &limits[..limits.len().min(MOST_LIMITS)];
@@ -174,7 +175,7 @@ impl<const WIDTH: usize> Bvh<WIDTH> {
         let mut visits = 0;
         while let Some((_, child)) = stack.pop() {
             visits += 1;
-            if visits > MOST_VISITS {
+            if visits > most_visits {
                 return false;
             }
             if child.count() == 0 {
@@ -225,7 +226,5 @@ fn key(more_than: f64) -> f32 {
     above(-more_than * (1.0 - 4.0 * f64::from(f32::EPSILON)))
 }
 
-/// Bound on the nodes and runs of faces that are visited for vertices within limits.
-const MOST_VISITS: usize = 256;
 /// As many as a box has sides.
 const MOST_LIMITS: usize = 6;
