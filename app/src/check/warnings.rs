@@ -19,6 +19,7 @@ pub(super) fn all(rig: &Rig, whole: &Scene, entities: &[Entity]) -> Vec<String> 
     let mut warnings = too_stiff(rig, &mut stands);
     warnings.extend(too_damped(rig));
     warnings.extend(too_loud(rig));
+    warnings.extend(sways(rig, entities));
     warnings.extend(together::too_much(rig, entities, &mut stands));
     let pairs = near::pairs(rig, entities);
     warnings.extend(contacts::all(rig, entities, &pairs));
@@ -92,6 +93,28 @@ fn too_stiff(rig: &Rig, stands: &mut Stands) -> Vec<String> {
         ))
     });
     told.collect()
+}
+
+/// What two fingers hold swings between them, and falls by e in `m / b`.
+fn sways(rig: &Rig, entities: &[Entity]) -> Option<String> {
+    let long = |(index, mass_kg): (usize, f64)| {
+        let spec = &rig.scene.entities[index];
+        let lasts_s = mass_kg / spec.damping_n_s_per_m;
+        let is_long = spec.is_haptic && spec.damping_n_s_per_m > 0.0 && lasts_s > MOST_SWAYING_S;
+        is_long.then_some((spec, mass_kg, lasts_s))
+    };
+    let all: Vec<_> = rig.masses(entities).filter_map(long).collect();
+    let &(spec, mass_kg, _) = all.first()?;
+    let names: Vec<_> =
+        all.iter().map(|(spec, _, lasts_s)| format!("{} ({lasts_s:.0} s)", spec.name)).collect();
+    let limit = rig.limits(Limits::DEFAULT_DEVICE_MASS_KG).ok()?.damping_n_s_per_m();
+    let ratio = (mass_kg / SWAYING_S).min(limit) / (2.0 * (spec.stiffness_n_per_m * mass_kg).sqrt());
+    Some(format!(
+        "{} may swing between two fingers, less by a factor e after so long: {} N s/m are little for {mass_kg} kg; \
+         `damping_ratio = {ratio:.3}` in place of `damping_n_s_per_m` is more",
+        in_words(&names),
+        spec.damping_n_s_per_m
+    ))
 }
 
 /// By the limit that effects' damping is refused above.
@@ -222,5 +245,8 @@ fn unseen(whole: &Scene) -> Vec<String> {
     unread.into_iter().chain(plain).collect()
 }
 
+/// What swings for longer than that between fingers is told \[s\], and what it may be instead.
+const MOST_SWAYING_S: f64 = 5.0;
+const SWAYING_S: f64 = 2.0;
 /// Doors are tried from so far to so far (m).
 const TRIED_M: f64 = 2.0 * SLAB_M;

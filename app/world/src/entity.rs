@@ -13,7 +13,7 @@ use crate::friction::FrictionSpec;
 use crate::grid::Grid;
 use crate::height_map::HeightMapSpec;
 use crate::material::read_material;
-use crate::motion::MotionSpec;
+use crate::motion::{MassSpec, MotionSpec};
 use crate::names::{Names, name_of};
 use crate::pose::read_pose;
 use crate::problems::Problems;
@@ -156,9 +156,14 @@ impl SceneEntity {
             None => (problems.keep(ShapeSpec::read(table)), problems.keep(read_pose(table))),
         };
         let stiffness = table.number_or("stiffness_n_per_m", Bound::Positive, stiffness);
-        let damping = table.number_or("damping_n_s_per_m", Bound::NotNegative, damping);
         let truth = |key: &str| table.get(key).map_or(Ok(true), |value| value.truth());
-        let (stiffness_n_per_m, damping_n_s_per_m) = (problems.keep(stiffness), problems.keep(damping));
+        let stiffness_n_per_m = problems.keep(stiffness);
+        let damping_n_s_per_m = match (&motion, stiffness_n_per_m) {
+            (Some(motion), Some(stiffness)) => {
+                problems.keep(read_damping(table, motion.as_ref(), stiffness, damping))
+            }
+            _ => None,
+        };
         let friction = problems.keep(FrictionSpec::read(table, made_of));
         let restitution = problems.keep(dynamics::read_restitution(table));
         let contact_stiffness =
@@ -232,6 +237,31 @@ impl SceneEntity {
     }
 }
 
+/// Damping (N s/m): as it is said, or a ratio to the critical one `2 sqrt(k m)` of its stiffness and mass, or the usual one.
+fn read_damping(
+    table: &Table<'_>,
+    motion: Option<&MotionSpec>,
+    stiffness_n_per_m: f64,
+    usual_n_s_per_m: f64,
+) -> Result<f64, SceneError> {
+    let Some(value) = table.get("damping_ratio") else {
+        return table.number_or("damping_n_s_per_m", Bound::NotNegative, usual_n_s_per_m);
+    };
+    if table.get("damping_n_s_per_m").is_some() {
+        return Err(value.out_of_range("either `damping_ratio` or `damping_n_s_per_m`, not both"));
+    }
+    let ratio = value.number(Bound::NotNegative)?;
+    if ratio > 1.0 {
+        return Err(value.out_of_range("a number from 0 to 1"));
+    }
+    match motion.map(|motion| motion.mass) {
+        Some(MassSpec::Mass(mass_kg)) => Ok(2.0 * ratio * (stiffness_n_per_m * mass_kg).sqrt()),
+        _ => {
+            Err(table.missing("mass_kg", "a number above 0: a `damping_ratio` is one of stiffness and mass"))
+        }
+    }
+}
+
 pub(crate) fn read_within(table: &Table<'_>) -> Result<Option<String>, SceneError> {
     let Some(value) = table.get("within") else { return Ok(None) };
     value.text("the name of an [[environment]] with a door").map(|name| Some(name.to_owned()))
@@ -259,6 +289,7 @@ const KEYS: Vocabulary = Vocabulary {
         "orientation_wxyz",
         "stiffness_n_per_m",
         "damping_n_s_per_m",
+        "damping_ratio",
         "friction",
         "faces",
         "algorithm",

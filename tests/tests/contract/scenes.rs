@@ -331,6 +331,15 @@ fn check_judges_effects_and_contacts_together() {
     assert_eq!(warnings(&ball(4.0, "")), none);
     let told = warnings(&ball(8.0, ""));
     assert!(told.len() == 1 && told[0].starts_with("ball (8 N s/m) may swing: at 1000 Hz"), "{told:?}");
+    // Heavy things between fingers swing on: by e in m / b.
+    let swings = |mass: &str| {
+        let told = warnings(&ball(1.0, mass));
+        told.iter().any(|it| it.starts_with("ball (20 s) may swing between two fingers")) || {
+            assert!(!told.iter().any(|it| it.contains("may swing between")), "{told:?}");
+            false
+        }
+    };
+    assert!(swings("mass_kg = 20.0\n") && !swings("mass_kg = 4.0\n"));
     // What only other things touch may be damped as it likes.
     assert_eq!(warnings(&ball(8.0, "haptic = false\n")), none);
     let told = warnings(&(fields(1, 4.0, 0.0) + &ball(4.0, "")));

@@ -55,6 +55,16 @@ fn of_tables_an_entity_says_what_differs_unless_it_says_what_it_is() {
 }
 
 #[test]
+fn a_damping_ratio_is_one_of_the_critical_damper_of_stiffness_and_mass() {
+    let scene = parsed(
+        "[[finger]]\n[[entity]]\nshape = { kind = \"sphere\", radius_m = 0.1 }\nmass_kg = 20.0\n\
+         stiffness_n_per_m = 500.0\ndamping_ratio = 0.05\n",
+    );
+    // 2 * 0.05 * sqrt(500 * 20), to the rounding of a root.
+    assert!((scene.entities[0].damping_n_s_per_m - 10.0).abs() < 1e-14);
+}
+
+#[test]
 fn a_template_builds_on_another_and_need_not_have_a_shape() {
     let scene = parsed(
         "[[finger]]\n[[entity]]\ntemplate = \"rubber-ball\"\n\
@@ -100,7 +110,7 @@ fn what_is_wrong_with_templates_and_grids_is_told_with_line_and_key() {
         (
             "[[finger]]\n[[template]]\nname = \"a\"\nmass = 1\n".into(),
             "s.toml:4: template[0].mass: unknown key (did you mean `mass_kg`?); allowed: name, shape, position_m, \
-             orientation_wxyz, stiffness_n_per_m, damping_n_s_per_m, friction, faces, algorithm, material, shading, height_map, \
+             orientation_wxyz, stiffness_n_per_m, damping_n_s_per_m, damping_ratio, friction, faces, algorithm, material, shading, height_map, \
              magnetism, vibration, movable, mass_kg, density_kg_m3, inertia_kg_m2, centre_of_mass_m, velocity_m_s, \
              angular_velocity_rad_s, rotation_locked, restitution, contact_stiffness_n_per_m, torsional_friction_m, rolling_friction_m, haptic, collidable, visual, template, grid, within",
         ),

@@ -137,6 +137,18 @@ fn a_number_outside_its_range_is_refused() {
         "s.toml:8: entity[0].damping_n_s_per_m: found -1; allowed: a number, 0 or more",
     );
     refused(
+        &with_entity("damping_ratio = 0.1"),
+        "s.toml:5: entity[0].mass_kg: missing; allowed: a number above 0: a `damping_ratio` is one of stiffness and mass",
+    );
+    refused(
+        &with_entity("mass_kg = 1\ndamping_ratio = 1.1"),
+        "s.toml:9: entity[0].damping_ratio: found 1.1; allowed: a number from 0 to 1",
+    );
+    refused(
+        &with_entity("mass_kg = 1\ndamping_ratio = 0.1\ndamping_n_s_per_m = 1"),
+        "s.toml:9: entity[0].damping_ratio: found 0.1; allowed: either `damping_ratio` or `damping_n_s_per_m`, not both",
+    );
+    refused(
         &with_entity("friction = { model = \"coulomb\", mu = -0.5 }"),
         "s.toml:8: entity[0].friction.mu: found -0.5; allowed: a number, 0 or more",
     );

@@ -9,7 +9,7 @@ use crate::{refused, with_entity, with_finger, with_shape, with_top};
 const SCENE_KEYS: &str = "name, gravity_m_s2, integrator, contact_response, contact_stiffness, grasp_quality, sleep, lists, hand, finger, entity, field, guide, \
      include, template, environment, light, camera";
 const FINGER_KEYS: &str = "name, radius_m, start_m, device, passivity, soft, attach, within";
-const ENTITY_KEYS: &str = "name, shape, position_m, orientation_wxyz, stiffness_n_per_m, damping_n_s_per_m, friction, faces, algorithm, \
+const ENTITY_KEYS: &str = "name, shape, position_m, orientation_wxyz, stiffness_n_per_m, damping_n_s_per_m, damping_ratio, friction, faces, algorithm, \
                            material, shading, height_map, magnetism, vibration, movable, mass_kg, density_kg_m3, inertia_kg_m2, \
                            centre_of_mass_m, velocity_m_s, angular_velocity_rad_s, rotation_locked, restitution, contact_stiffness_n_per_m, torsional_friction_m, rolling_friction_m, haptic, collidable, \
                            visual, template, grid, within";
