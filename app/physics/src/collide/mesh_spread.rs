@@ -130,7 +130,7 @@ impl Lows {
         let mut seen = Seen { names: [0; SEEN] };
         let see = |corner: Corner| {
             let (number, at_M) = (corner.vertex(mesh), *corner.point_M(mesh));
-            if scattered(number) % (1 << halvings) != 0 || !seen.is_new(number) {
+            if !scattered(number).is_multiple_of(1 << halvings) || !seen.is_new(number) {
                 return true;
             }
             let Some(place) = all.get_mut(*count) else { return false };
