@@ -11,11 +11,13 @@ use crate::control::queue::OrderReceiver;
 use crate::control::{Control, OrderTally};
 use crate::displaced::Displaced;
 use crate::fast_step::{EventTeller, FastStep};
+use crate::pace::Pace;
 use crate::room_supply::RoomSupply;
 use crate::row::{BodyRow, Row};
 use crate::row_queue::RowSender;
 use bytemuck::Zeroable;
 use shm_abi::{Command, CommanderMemory, DriverState, DriverView, Frame};
+use std::time::Instant;
 use world::events::{Event, EventSender, Kind};
 
 /// How far a missed frame is searched for in the ring: the next one is nearly always among these.
@@ -50,6 +52,8 @@ pub struct FastLoop {
     step: FastStep,
     /// More room for its contacts, when it needs that.
     supply: RoomSupply,
+    /// How much of what moves a tick has time for, if it has not as much as it likes.
+    pace: Option<Pace>,
     /// What people change meanwhile, if anybody may.
     control: Option<Control>,
     /// Finds what happens, and where that is told, if anybody wants to know.
@@ -105,6 +109,12 @@ pub struct Tally {
     pub crowded: u64,
     /// Number of times that contacts between entities had no room, in the fast list.
     pub left_out: u64,
+    /// Ticks in which not all that moves was stepped.
+    pub held_ticks: u64,
+    /// Number stepped in these, in all.
+    pub stepped_then: u64,
+    /// The most bodies that waited in one.
+    pub most_held: usize,
     /// How often a force was cut because nothing moved for it.
     pub cuts: u64,
     /// The most that was cut at once (N).
@@ -145,6 +155,7 @@ impl FastLoop {
             displaced: Displaced::new(step.entities().len()),
             step,
             supply: RoomSupply::default(),
+            pace: None,
             control: None,
             events: None,
             is_first_scene: true,
@@ -183,6 +194,13 @@ impl FastLoop {
     #[must_use]
     pub fn with_supply(mut self, supply: RoomSupply) -> Self {
         self.supply = supply;
+        self
+    }
+
+    /// With ticks that have a deadline: what they have no time for waits for its turn.
+    #[must_use]
+    pub fn with_deadlines(mut self) -> Self {
+        self.pace = Some(Pace::new(self.period_ns));
         self
     }
 
@@ -288,8 +306,14 @@ impl FastLoop {
     fn render(&mut self, commander: &CommanderMemory, driver: &DriverView) {
         self.command = Command::zero(self.frame.tick, commander.lease(), self.frame.device_count);
         self.step.meet_driver(driver.abi_minor(), driver.ramp_in_ticks());
+        let begin = self.pace.map(|pace| (pace, Instant::now()));
+        self.step.step_at_most(begin.map_or(usize::MAX, |(pace, _)| pace.bodies()));
         self.step.step(&self.frame, &mut self.command, &mut self.row);
         commander.publish(&self.command, driver);
+        if let (Some(pace), Some((_, begin))) = (&mut self.pace, begin) {
+            let made = self.step.made();
+            pace.take(begin.elapsed().as_nanos() as u64, made.awake, made.held > 0);
+        }
         self.supply.serve(&mut self.step);
     }
 
@@ -349,6 +373,10 @@ impl FastLoop {
         self.tally.park(self.step.parked_now(), self.row.run_tick, self.is_first_scene);
         self.tally.crowded += u64::from(self.step.is_crowded());
         self.tally.left_out = self.tally.left_out.max(self.step.left_out());
+        let physics::Made { held, awake, .. } = self.step.made();
+        self.tally.held_ticks += u64::from(held > 0);
+        self.tally.stepped_then += if held > 0 { awake as u64 } else { 0 };
+        self.tally.most_held = self.tally.most_held.max(held);
         for cut in self.step.cuts() {
             self.tally.cuts += 1;
             self.tally.most_cut_n = self.tally.most_cut_n.max(cut.force_n);

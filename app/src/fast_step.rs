@@ -231,6 +231,11 @@ impl FastStep {
         })
     }
 
+    /// From now on no more of what moves than this is stepped in a tick here ([`Manipulation::step_at_most`]).
+    pub fn step_at_most(&mut self, bodies: usize) {
+        self.objects.most_stepped = bodies;
+    }
+
     /// What moving the entities took in the last tick.
     pub fn made(&self) -> physics::Made {
         self.objects.made

@@ -37,6 +37,7 @@ mod not_zeroed;
 pub mod on_request;
 pub mod outcome;
 mod outputs;
+pub mod pace;
 pub mod passive_port;
 mod per_shape;
 pub mod picture;

@@ -119,6 +119,14 @@ impl fmt::Display for Report {
                 "left out     {left_out} times a contact between objects that had no room; they may go through each other"
             )?;
         }
+        if tally.held_ticks > 0 {
+            let (ticks, most, mean) =
+                (tally.held_ticks, tally.most_held, tally.stepped_then / tally.held_ticks);
+            writeln!(
+                f,
+                "in turns     {ticks} ticks had no time for all that moves; it moved {mean} in the mean, and up to {most} waited for their turn"
+            )?;
+        }
         if tally.crowded > 0 {
             let crowded = tally.crowded;
             writeln!(

@@ -113,7 +113,8 @@ pub fn run(
     let run_ticks = Arc::<AtomicU64>::default();
     let slow_list = start_slow_list(&mut fast, later, &attachment.driver, &run_ticks)?;
     if attachment.driver.info().clock_mode == ClockMode::Real {
-        fast = fast.with_supply(RoomSupply::start().map_err(|error| no_thread("room for contacts", &error))?);
+        let supply = RoomSupply::start().map_err(|error| no_thread("room for contacts", &error))?;
+        fast = fast.with_supply(supply).with_deadlines();
     }
     loop {
         // In lockstep ticks wait for replies instead.

@@ -16,6 +16,7 @@ mod pressing;
 mod rest;
 mod room;
 mod struck;
+mod turns;
 
 pub use driven::MAX_DRIVEN;
 pub use made::{Made, Parked, Reason};
@@ -45,6 +46,7 @@ use crate::solver::{Motion, Solved};
 use crate::touch::Touch;
 use room::{RowCounts, RowRoom};
 use struck::{IN_A_ROW, Struck};
+use turns::Turns;
 
 /// All bodies, and what they remember of where they touch. There is no copy of one: it would not have its room.
 #[derive(Debug)]
@@ -92,6 +94,8 @@ pub struct Manipulation {
     neighbours: Vec<u32>,
     /// Entities that somebody moves.
     driven: Vec<Driven>,
+    /// Who is stepped, where not all can be.
+    turns: Turns,
     /// Whether bodies that somebody else steps are not there.
     ignores_elsewhere: bool,
     /// Bodies that are not as they were, each once.
@@ -190,6 +194,7 @@ impl Manipulation {
             last_anchors: Default::default(),
             neighbours: Vec::with_capacity(count),
             driven: Vec::with_capacity(MAX_DRIVEN),
+            turns: Turns::new(count),
             ignores_elsewhere: false,
             changed: Vec::with_capacity(count),
             has_changed: vec![false; count].into(),
@@ -269,6 +274,7 @@ impl Manipulation {
             self.wake_entity(pull.entity, entities);
         }
         self.wake_near_driven(entities);
+        self.take_turns(entities, touches);
         self.line_up(entities, dt_s);
         if self.wake_what_is_met(entities, dt_s) {
             self.line_up(entities, dt_s);
@@ -305,7 +311,7 @@ impl Manipulation {
         self.advance_driven(entities);
         self.keep_up(entities, dt_s);
         self.rest(entities, touches, dt_s);
-        Made { rows: self.room.rows.len(), sweeps, residual, unsolved, parked, awake }
+        Made { rows: self.room.rows.len(), sweeps, residual, unsolved, parked, awake, held: self.held() }
     }
 }
 

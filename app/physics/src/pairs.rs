@@ -321,6 +321,19 @@ impl Pairs {
         });
     }
 
+    /// Takes up the pairs of bodies that are awake now, and puts those aside of which none is any more. No box has changed.
+    pub(crate) fn regroup(&mut self, is_awake: impl Fn(usize) -> bool, who: &Who<'_>) {
+        let Self { awake, asleep, fresh, .. } = self;
+        let is_awake = |key: &Key| {
+            let other = who.bodies[key.entity as usize];
+            is_awake(key.body as usize) || other.is_some_and(|other| is_awake(other as usize))
+        };
+        move_out(awake, fresh, |key| !is_awake(key));
+        merge(asleep, fresh);
+        move_out(asleep, fresh, is_awake);
+        merge(awake, fresh);
+    }
+
     /// Begins a pair as it was elsewhere, in none of the lists: `None` where there is no room.
     pub(crate) fn begin_as(&mut self, head: &Head) -> Option<u32> {
         let Some(place) = self.unused.pop() else {
@@ -433,6 +446,17 @@ impl Pairs {
     pub(crate) fn end(&mut self, key: &Key) {
         self.unused.push(key.place);
     }
+}
+
+/// Moves those keys out that go.
+fn move_out(keys: &mut Vec<Key>, to: &mut Vec<Key>, goes: impl Fn(&Key) -> bool) {
+    keys.retain(|key| {
+        let goes = goes(key);
+        if goes {
+            to.push(*key);
+        }
+        !goes
+    });
 }
 
 /// Puts keys into others that are in order; none is in both.

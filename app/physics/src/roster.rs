@@ -14,6 +14,8 @@ pub enum Standing {
     Awake,
     /// It rests, and is not stepped until something touches it.
     Asleep,
+    /// It waits for its turn, since a tick has no time for all that moves: fixed until then, with the velocity that it had.
+    Held,
     /// It has left the world, or was lost to a number that is none: it stays where it is for good.
     Parked,
     /// Somebody else steps it: it is as if it were fixed where that one said last.

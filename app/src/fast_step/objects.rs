@@ -69,6 +69,8 @@ pub struct Objects {
     pub(super) is_paused: bool,
     /// What was moved, as the slow list has to know it.
     pub(super) moved: Moved,
+    /// The most bodies that a tick steps.
+    pub(super) most_stepped: usize,
     /// What the last tick took.
     pub made: Made,
     /// By how much it moved them (s).
@@ -115,6 +117,7 @@ impl Objects {
             stands_still: false,
             is_paused: false,
             moved: Moved::default(),
+            most_stepped: usize::MAX,
             made: Made::default(),
             stepped_s: 0.0,
         };
@@ -315,6 +318,7 @@ impl Objects {
         }
         let dt_s = dt_s.min(MOST_TICKS * self.period_s);
         self.stepped_s = dt_s;
+        self.manipulation.step_at_most(self.most_stepped, self.ticks.iter().map(|tick| tick.hip_W));
         self.made = self.manipulation.step_pulled(
             entities,
             &mut self.touches,

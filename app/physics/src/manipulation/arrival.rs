@@ -72,7 +72,15 @@ impl Manipulation {
 
     /// All of the island is here.
     fn let_in(&mut self, entities: &[Entity], mut arrived: impl FnMut(usize)) {
-        let Self { arrival: Arrival { bodies, keys, .. }, roster, pairs, broad_phase, .. } = self;
+        let Self { arrival: Arrival { bodies, keys, .. }, roster, pairs, broad_phase, turns, .. } = self;
+        let are_enough = turns.are_enough(roster.awake().len() + bodies.len().saturating_sub(1));
+        for (body, standing) in bodies.iter_mut().filter(|(_, standing)| *standing == Standing::Awake) {
+            if are_enough {
+                *standing = Standing::Held;
+                turns.hold(*body as usize);
+                turns.change();
+            }
+        }
         roster.set_all(bodies.iter().map(|&(body, standing)| (body as usize, standing)));
         let mut sleeper = None;
         for &(body, _) in bodies.iter().filter(|(_, standing)| *standing == Standing::Asleep) {

@@ -23,19 +23,31 @@ impl Manipulation {
     ///
     /// Cost: some walks through the keys of all pairs, at most one more than bodies; a chain takes two.
     pub fn island(&mut self, body: usize, island: &mut Vec<usize>) -> bool {
+        self.island_if(body, island, |_, _| true)
+    }
+
+    /// As [`Self::island`], as long as all of it may be in there; `false`: it is not whole.
+    pub fn island_if(
+        &mut self,
+        body: usize,
+        island: &mut Vec<usize>,
+        may_be: impl Fn(&Self, usize) -> bool,
+    ) -> bool {
         island.clear();
-        let is_whole = !self.is_here(body) || (self.mark(body, island) && self.mark_all_near(island));
+        let is_whole =
+            !self.is_here(body) || (self.mark(body, island, &may_be) && self.mark_all_near(island, &may_be));
         self.unmark(island);
         island.sort_unstable();
         is_whole
     }
 
-    fn mark_all_near(&mut self, island: &mut Vec<usize>) -> bool {
+    fn mark_all_near(&mut self, island: &mut Vec<usize>, may_be: &impl Fn(&Self, usize) -> bool) -> bool {
         let mut seen = 0;
         while seen < island.len() {
             let new = std::mem::replace(&mut seen, island.len());
-            let fits =
-                self.mark_rings(new, island) && self.mark_near(island, false) && self.mark_near(island, true);
+            let fits = self.mark_rings(new, island, may_be)
+                && self.mark_near(island, false, may_be)
+                && self.mark_near(island, true, may_be);
             if !fits {
                 return false;
             }
@@ -44,12 +56,17 @@ impl Manipulation {
     }
 
     /// Who sleeps wakes with all others of its ring.
-    fn mark_rings(&mut self, new: usize, island: &mut Vec<usize>) -> bool {
+    fn mark_rings(
+        &mut self,
+        new: usize,
+        island: &mut Vec<usize>,
+        may_be: &impl Fn(&Self, usize) -> bool,
+    ) -> bool {
         let mut at = new;
         while let Some(&one) = island.get(at) {
             at += 1;
             let next = self.roster.next(one);
-            if self.roster.standing(one) == Standing::Asleep && !self.mark(next, island) {
+            if self.roster.standing(one) == Standing::Asleep && !self.mark(next, island, may_be) {
                 return false;
             }
         }
@@ -57,26 +74,32 @@ impl Manipulation {
     }
 
     /// One walk through all pairs, in order or against it: so that a chain of any length is found by one of both.
-    fn mark_near(&mut self, island: &mut Vec<usize>, backwards: bool) -> bool {
-        let (count, mut fits) = (self.pairs.key_count(), true);
+    fn mark_near(
+        &mut self,
+        island: &mut Vec<usize>,
+        backwards: bool,
+        may_be: &impl Fn(&Self, usize) -> bool,
+    ) -> bool {
+        let count = self.pairs.key_count();
         for at in 0..count {
             let key = *self.pairs.key_at(if backwards { count - 1 - at } else { at });
             if key.is_near
                 && let Some([one, other]) = self.bodies_of(&key)
                 && self.is_marked[one] != self.is_marked[other]
+                && !self.mark(if self.is_marked[one] { other } else { one }, island, may_be)
             {
-                fits &= self.mark(if self.is_marked[one] { other } else { one }, island);
+                return false;
             }
         }
-        fits
+        true
     }
 
-    /// Takes a body that is here into the island; says whether there was room.
-    fn mark(&mut self, body: usize, island: &mut Vec<usize>) -> bool {
+    /// Takes a body that is here into the island; says whether there was room, and it may be there.
+    fn mark(&mut self, body: usize, island: &mut Vec<usize>, may_be: &impl Fn(&Self, usize) -> bool) -> bool {
         if self.is_marked[body] || !self.is_here(body) {
             return true;
         }
-        let has_room = island.len() < island.capacity();
+        let has_room = island.len() < island.capacity() && may_be(self, body);
         if has_room {
             self.is_marked[body] = true;
             island.push(body);
@@ -116,6 +139,6 @@ impl Manipulation {
     }
 
     fn is_here(&self, body: usize) -> bool {
-        matches!(self.roster.standing(body), Standing::Awake | Standing::Asleep)
+        matches!(self.roster.standing(body), Standing::Awake | Standing::Asleep | Standing::Held)
     }
 }

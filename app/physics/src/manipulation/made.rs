@@ -15,6 +15,8 @@ pub struct Made {
     pub parked: usize,
     /// Bodies that were stepped.
     pub awake: usize,
+    /// Bodies that would have been, and wait for their [turn](crate::Manipulation::step_at_most).
+    pub held: usize,
 }
 
 /// A body that does not move any more.

@@ -12,13 +12,13 @@ impl Manipulation {
         self.pairs.iter_awake().map(|(_, pair)| (pair.entities, pair.force_W(&self.room.rows)))
     }
 
-    /// Whether nobody steps these two at the time because at least one of them sleeps: what they did to each other, they still
-    /// do.
+    /// Whether nobody steps these two at the time because at least one of them sleeps, or waits for its turn: what they did to
+    /// each other, they still do.
     pub fn rest_together(&self, entities: [usize; 2]) -> bool {
         let mut standings =
             entities.into_iter().filter_map(|entity| self.body_of(entity)).map(|body| self.standing(body));
         let [first, second] = [standings.next(), standings.next()];
-        let is_asleep = |standing| standing == Some(Standing::Asleep);
+        let is_asleep = |standing| matches!(standing, Some(Standing::Asleep | Standing::Held));
         let is_awake = |standing| standing == Some(Standing::Awake);
         (is_asleep(first) || is_asleep(second)) && !is_awake(first) && !is_awake(second)
     }

@@ -17,11 +17,24 @@ impl Manipulation {
         let mut next = body;
         while self.roster.standing(next) == Standing::Asleep {
             let after = self.roster.next(next);
-            self.roster.set(next, Standing::Awake);
-            let who = who(&self.roster, entities, self.contacts);
-            self.pairs.wake(next, &who, &self.broad_phase);
+            if next != body && self.turns.are_enough(self.roster.awake().len()) {
+                self.roster.set(next, Standing::Held);
+                self.turns.hold(next);
+                self.turns.change();
+            } else {
+                self.begin_to_step(next, entities);
+            }
             next = after;
         }
+        if self.roster.standing(body) == Standing::Held {
+            self.begin_to_step(body, entities);
+        }
+    }
+
+    fn begin_to_step(&mut self, body: usize, entities: &[Entity]) {
+        self.roster.set(body, Standing::Awake);
+        let who = who(&self.roster, entities, self.contacts);
+        self.pairs.wake(body, &who, &self.broad_phase);
     }
 
     pub(super) fn wake_entity(&mut self, entity: usize, entities: &[Entity]) {

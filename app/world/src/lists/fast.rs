@@ -258,7 +258,8 @@ impl FastList {
 
     /// Whether a body is here, and nothing but its neighbours is against its going.
     fn may_go(&self, body: usize, manipulation: &Manipulation) -> bool {
-        let is_here = matches!(manipulation.standing(body), Standing::Awake | Standing::Asleep);
+        let standing = manipulation.standing(body);
+        let is_here = matches!(standing, Standing::Awake | Standing::Asleep | Standing::Held);
         let around = manipulation.broad_phase().around(manipulation.entity_of(body));
         let is_near =
             |around: &Aabb| self.around.iter().chain(&self.soon).any(|finger| finger.overlaps(around));
@@ -267,8 +268,7 @@ impl FastList {
 
     fn give_away(&mut self, body: usize, manipulation: &mut Manipulation, entities: &[Entity]) {
         let mut island = std::mem::take(&mut self.island);
-        let goes = manipulation.island(body, &mut island)
-            && island.iter().all(|&body| self.may_go(body, manipulation))
+        let goes = manipulation.island_if(body, &mut island, |all, body| self.may_go(body, all))
             && !manipulation.is_met(&island, entities, self.settings.ahead_s);
         if goes {
             for &body in &island {

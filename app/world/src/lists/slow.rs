@@ -173,7 +173,7 @@ impl SlowList {
     /// an order waits for it.
     fn has(&self, body: usize) -> bool {
         match self.manipulation.standing(body) {
-            Standing::Awake | Standing::Asleep => true,
+            Standing::Awake | Standing::Asleep | Standing::Held => true,
             Standing::Parked => self.fetched.contains(&body),
             Standing::Elsewhere | Standing::Coming => false,
         }

@@ -1,0 +1,181 @@
+//! Turns of what moves, where that is more than a tick has time for.
+//!
+//! Problem: a finger in a heap wakes all of it, and a tick of a hundred mixed things takes several ticks' time; the finger would
+//! get no answers, and feel nothing.
+//! Model: no more than [so many](Manipulation::step_at_most) bodies are stepped in a tick. Three quarters of the places are for
+//! those that are nearest to the fingers; the others go round among all that is left. Who waits is [`Standing::Held`]: fixed
+//! where it is for who is stepped, like what sleeps. It keeps its velocity and goes on with it in its turn: what is far from
+//! fingers moves more slowly than it would.
+//! Invariants: nothing gets energy by it, for what is fixed does no work, and what a contact holds stays in its account; who a
+//! finger touches is stepped; no allocation.
+//! Cost: turns change once in [`TURN`] ticks, or where more woke than may be stepped: then a distance for each that is here,
+//! and two walks through all pairs.
+
+use haptics::Entity;
+use nalgebra::Vector3;
+
+use super::{Manipulation, who};
+use crate::collide::bounding_ball;
+use crate::roster::{Roster, Standing};
+use crate::touch::Touch;
+
+/// Who is stepped and who waits.
+#[derive(Debug, Clone)]
+pub(super) struct Turns {
+    /// The most bodies in a tick.
+    most: usize,
+    /// Places of fingers \[m\].
+    near: Vec<Vector3<f64>>,
+    /// Those that wait, and some that do not any more.
+    held: Vec<u32>,
+    /// Of each that is stepped or waits, how far it is from a finger \[m\].
+    all: Vec<(f64, u32)>,
+    /// Of each body, whether it is stepped from now on.
+    is_chosen: Box<[bool]>,
+    /// The last one whose turn came because all have one.
+    last: u32,
+    /// Tick in which turns change at the latest.
+    change_at: u64,
+}
+
+impl Turns {
+    pub(super) fn new(bodies: usize) -> Self {
+        Self {
+            most: usize::MAX,
+            near: Vec::with_capacity(MOST_NEAR),
+            held: Vec::with_capacity(2 * bodies),
+            all: Vec::with_capacity(bodies),
+            is_chosen: vec![false; bodies].into(),
+            last: 0,
+            change_at: 0,
+        }
+    }
+
+    /// Takes note of one that waits from now on.
+    pub(super) fn hold(&mut self, body: usize) {
+        if self.held.len() < self.held.capacity() {
+            self.held.push(body as u32);
+        }
+    }
+
+    /// Turns change in the next tick.
+    pub(super) fn change(&mut self) {
+        self.change_at = 0;
+    }
+
+    /// Whether so many are as many as may be stepped.
+    pub(super) fn are_enough(&self, awake: usize) -> bool {
+        awake >= self.most
+    }
+}
+
+impl Manipulation {
+    /// From now on no more bodies than this are stepped in a tick, but for who is touched or struck in it; of more those that are
+    /// nearest to these places, and all others in turns.
+    pub fn step_at_most(&mut self, most: usize, near_W: impl Iterator<Item = Vector3<f64>>) {
+        self.turns.most = most.max(1);
+        self.turns.near.clear();
+        let are_numbers = |near_W: &Vector3<f64>| near_W.iter().all(|x| x.is_finite());
+        self.turns.near.extend(near_W.filter(are_numbers).take(MOST_NEAR));
+    }
+
+    /// How many wait for their turn.
+    pub fn held(&self) -> usize {
+        self.turns.held.iter().filter(|body| self.roster.standing(**body as usize) == Standing::Held).count()
+    }
+
+    /// Before a tick: who is stepped in it.
+    pub(super) fn take_turns(&mut self, entities: &mut [Entity], touches: &[Touch]) {
+        let is_over = self.roster.awake().len() > self.turns.most;
+        if !is_over && (self.turns.held.is_empty() || self.ticks < self.turns.change_at) {
+            return;
+        }
+        self.turns.change_at = self.ticks + TURN;
+        self.see_all(entities, touches);
+        self.choose();
+        self.change_turns(entities);
+    }
+
+    /// Lists who is stepped or waits, with how far it is from a finger.
+    fn see_all(&mut self, entities: &[Entity], touches: &[Touch]) {
+        let Self { turns, roster, hand, is_marked: is_seen, .. } = self;
+        let Turns { near, held, all, is_chosen, .. } = turns;
+        all.clear();
+        let apart_m = |body: usize| {
+            let radius_m = bounding_ball(&entities[roster.entities[body]].shape).map_or(0.0, |ball| ball.1);
+            let to_centre_m = |near_W: &Vector3<f64>| (near_W - roster.bodies[body].centre_W).norm();
+            near.iter().map(to_centre_m).fold(f64::INFINITY, f64::min) - radius_m
+        };
+        let is_touched = |body: usize| touches.iter().any(|touch| touch.entity == roster.entities[body]);
+        for &body in roster.awake() {
+            is_chosen[body] = false;
+            let is_at_hand = hand.is_tied_to(body) || is_touched(body);
+            all.push((if is_at_hand { f64::NEG_INFINITY } else { apart_m(body) - STAYS_M }, body as u32));
+        }
+        // One that waited, was woken and waits again is there twice.
+        held.retain(|&body| {
+            roster.standing(body as usize) == Standing::Held
+                && !std::mem::replace(&mut is_seen[body as usize], true)
+        });
+        for &body in &*held {
+            is_seen[body as usize] = false;
+            is_chosen[body as usize] = false;
+            all.push((apart_m(body as usize), body));
+        }
+    }
+
+    /// Chooses the nearest, and those whose turn it is.
+    fn choose(&mut self) {
+        let Turns { most, near, all, is_chosen, last, .. } = &mut self.turns;
+        let most = (*most).min(all.len());
+        let nearest = if near.is_empty() { 0 } else { (most - most / 4).min(all.len()) };
+        if nearest > 0 && nearest < all.len() {
+            all.select_nth_unstable_by(nearest - 1, |one, other| one.0.total_cmp(&other.0));
+        }
+        let (chosen, rest) = all.split_at_mut(nearest);
+        let others = (most - nearest).min(rest.len());
+        let begin = *last;
+        let after = move |body: &(f64, u32)| body.1.wrapping_sub(begin).wrapping_sub(1);
+        if others > 0 && others < rest.len() {
+            rest.select_nth_unstable_by_key(others - 1, after);
+        }
+        let in_turn = &rest[..others];
+        if let Some(&(_, body)) = in_turn.iter().max_by_key(|body| after(body)) {
+            *last = body;
+        }
+        for (_, body) in chosen.iter().chain(in_turn) {
+            is_chosen[*body as usize] = true;
+        }
+    }
+
+    /// Holds who is stepped and was not chosen, and wakes who was.
+    fn change_turns(&mut self, entities: &mut [Entity]) {
+        let Self { turns: Turns { all, is_chosen, held, .. }, roster, .. } = self;
+        let standing = |roster: &Roster, body: u32| roster.standing(body as usize);
+        for &(_, body) in &*all {
+            if !is_chosen[body as usize] && standing(roster, body) == Standing::Awake {
+                let entity = &mut entities[roster.entities[body as usize]];
+                entity.move_to(entity.X_WB);
+                if held.len() < held.capacity() {
+                    held.push(body);
+                }
+            }
+        }
+        let changes = all.iter().map(|&(_, body)| {
+            let body = body as usize;
+            (body, if is_chosen[body] { Standing::Awake } else { Standing::Held })
+        });
+        roster.set_all(changes);
+        held.retain(|&body| !is_chosen[body as usize]);
+        let is_awake = |body: usize| roster.standing(body) == Standing::Awake;
+        let who = who(roster, entities, self.contacts);
+        self.pairs.regroup(is_awake, &who);
+    }
+}
+
+/// Turns last so many ticks.
+const TURN: u64 = 16;
+/// Places of fingers and of what they hold.
+const MOST_NEAR: usize = 16;
+/// Who is stepped counts as so much nearer: two that are as near do not take turns \[m\].
+const STAYS_M: f64 = 2e-3;
