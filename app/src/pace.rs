@@ -2,7 +2,7 @@
 //!
 //! Problem: what a heap costs hangs on its shapes, on how it lies and on the machine. A finger in one that takes longer than a
 //! tick gets no answers.
-//! Model: where two ticks in a row took more than a [share](SHARE) of the time between two, fewer are stepped
+//! Model: where two ticks in a row took more than a third of the time between two, fewer are stepped
 //! ([`physics::Manipulation::step_at_most`]), as many as would have kept to it, or half as many; where of many nearly all took less
 //! than half of that while some waited, more are. One that was held up by something else changes nothing.
 

@@ -11,7 +11,7 @@ use io_driver::sim::hand::model_file::Firmness;
 use std::collections::BTreeMap;
 use std::path::Path;
 use world::model;
-use world::{Scene, ShapeSpec};
+use world::{Scene, SceneEntity, ShapeSpec};
 
 /// All of them.
 pub(super) fn all(rig: &Rig, whole: &Scene, entities: &[Entity]) -> Vec<String> {
@@ -95,23 +95,27 @@ fn too_stiff(rig: &Rig, stands: &mut Stands) -> Vec<String> {
     told.collect()
 }
 
-/// What two fingers hold swings between them, and falls by e in `m / b`.
+/// What two fingers hold swings between them, and falls by e in `m / b`; more damping than the loop stands is no remedy.
 fn sways(rig: &Rig, entities: &[Entity]) -> Option<String> {
+    let limit = rig.limits(Limits::DEFAULT_DEVICE_MASS_KG).ok()?.damping_n_s_per_m();
     let long = |(index, mass_kg): (usize, f64)| {
         let spec = &rig.scene.entities[index];
-        let lasts_s = mass_kg / spec.damping_n_s_per_m;
-        let is_long = spec.is_haptic && spec.damping_n_s_per_m > 0.0 && lasts_s > MOST_SWAYING_S;
-        is_long.then_some((spec, mass_kg, lasts_s))
+        let damping = spec.damping_n_s_per_m;
+        let is_long = mass_kg > MOST_SWAYING_S * damping && damping < 0.5 * limit;
+        (spec.is_haptic && is_long).then_some((spec, mass_kg))
     };
     let all: Vec<_> = rig.masses(entities).filter_map(long).collect();
-    let &(spec, mass_kg, _) = all.first()?;
-    let names: Vec<_> =
-        all.iter().map(|(spec, _, lasts_s)| format!("{} ({lasts_s:.0} s)", spec.name)).collect();
-    let limit = rig.limits(Limits::DEFAULT_DEVICE_MASS_KG).ok()?.damping_n_s_per_m();
-    let ratio = (mass_kg / SWAYING_S).min(limit) / (2.0 * (spec.stiffness_n_per_m * mass_kg).sqrt());
+    let &(spec, mass_kg) = all.first()?;
+    let lasts = |(spec, mass_kg): &(&SceneEntity, f64)| match spec.damping_n_s_per_m {
+        0.0 => format!("{} (for ever)", spec.name),
+        damping => format!("{} ({:.0} s)", spec.name, mass_kg / damping),
+    };
+    let names: Vec<_> = all.iter().map(lasts).collect();
+    // Down to a tenth, so that it is stable as it is written.
+    let more = ((mass_kg / SWAYING_S).min(limit) * 10.0).floor() / 10.0;
     Some(format!(
         "{} may swing between two fingers, less by a factor e after so long: {} N s/m are little for {mass_kg} kg; \
-         `damping_ratio = {ratio:.3}` in place of `damping_n_s_per_m` is more",
+         `damping_n_s_per_m = {more:.1}` is more",
         in_words(&names),
         spec.damping_n_s_per_m
     ))

@@ -488,9 +488,15 @@ fn shown_key(key: &str) -> String {
 }
 
 /// Keys of which a table can have one only: the upper table's hides the other beneath.
-const RIVALS: [[&str; 2]; 2] = [["mass_kg", "density_kg_m3"], ["size_m", "repeat"]];
+const RIVALS: [[&str; 2]; 4] = [
+    ["mass_kg", "density_kg_m3"],
+    ["size_m", "repeat"],
+    ["damping_n_s_per_m", "damping_ratio"],
+    ["density_kg_m3", "damping_ratio"],
+];
 /// Keys that `movable = false` hides: a fixed one of a template that moves.
-const OF_MOVING: [&str; 7] = [
+const OF_MOVING: [&str; 8] = [
+    "damping_ratio",
     "mass_kg",
     "density_kg_m3",
     "inertia_kg_m2",

@@ -9,7 +9,8 @@
 //! Where more than [`MOST_VERTICES`] are within reach, only every second one counts, or every fourth, and so on: of each its
 //! number says whether it does, wherever the mesh stands.
 //! Identity: a chosen one stays chosen while it is within reach; how many count changes only where they are too many or few.
-//! Cost: a query, and a distance for each vertex and chosen one: some microseconds for [`MOST_VERTICES`].
+//! Cost: a query, and a distance for each vertex and chosen one: up to some tens of microseconds. Where there are more than it has
+//! room for, they are looked at again after a while.
 
 use nalgebra::Vector3;
 
@@ -25,14 +26,21 @@ pub(crate) struct Spread {
     chosen: [u32; MAX_POINTS],
     /// How often every second one was left out.
     halvings: u32,
-    /// There are too many.
+    /// A few stand for all: there are too many, or they are not on a plane.
     is_crowded: bool,
+    /// Ticks until they are counted again.
+    waits: u32,
 }
 
 impl Spread {
-    /// Whether a few vertices stand for many, because these are too many.
+    /// Whether a few vertices stand for many that press softly.
     pub(crate) fn is_crowded(&self) -> bool {
         self.is_crowded
+    }
+
+    /// Where others than planes are touched.
+    pub(super) fn elsewhere(is_soft: bool) -> Self {
+        Self { is_crowded: is_soft, ..Self::default() }
     }
 }
 
@@ -63,11 +71,15 @@ pub(super) fn tell(
     memory: &mut Spread,
     mut tell: impl FnMut(&Contact),
 ) -> bool {
+    if memory.waits > 0 {
+        memory.waits -= 1;
+        return false;
+    }
     let mut lows =
         Lows { all: [Low::default(); MOST_VERTICES], count: 0, chosen: [0; MAX_POINTS], groups: 0 };
     while !lows.find(standing, memory.halvings) {
         if memory.halvings == MOST_HALVINGS {
-            memory.is_crowded = true;
+            (memory.is_crowded, memory.waits) = (true, WAITS);
             return false;
         }
         memory.halvings += 1;
@@ -198,6 +210,8 @@ impl Lows {
 
 /// The most within reach of which all count.
 pub(super) const MOST_VERTICES: usize = 256;
+/// Where there were too many they are for so many ticks.
+const WAITS: u32 = 31;
 /// Where fewer count of those that could, twice as many do.
 const FEW_VERTICES: usize = 96;
 /// A sixteenth is left then.

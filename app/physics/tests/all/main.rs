@@ -73,3 +73,4 @@ mod stack;
 mod struck;
 mod torque_free;
 mod turning_friction;
+mod turns;

@@ -65,6 +65,24 @@ fn a_damping_ratio_is_one_of_the_critical_damper_of_stiffness_and_mass() {
 }
 
 #[test]
+fn a_damping_ratio_of_a_template_is_hidden_by_what_excludes_it_and_hides_damping() {
+    let scene = |of_template: &str, own: &str| {
+        let text = format!(
+            "[[finger]]\n[[template]]\nname = \"t\"\nshape = {{ kind = \"sphere\", radius_m = 0.1 }}\n{of_template}\n\
+             [[entity]]\ntemplate = \"t\"\n{own}\n"
+        );
+        parsed(&text).entities[0].damping_n_s_per_m
+    };
+    let heavy = "mass_kg = 4.0\ndamping_ratio = 0.1";
+    assert_eq!(scene(heavy, "damping_n_s_per_m = 2.0"), 2.0);
+    assert_eq!(scene(heavy, "movable = false"), 0.0);
+    assert_eq!(scene(heavy, "density_kg_m3 = 500.0"), 1.0);
+    // Of 1000 N/m and 4 kg.
+    let expected = 0.2 * 4000.0_f64.sqrt();
+    assert!((scene("damping_n_s_per_m = 2.0", heavy) - expected).abs() < 1e-14);
+}
+
+#[test]
 fn a_template_builds_on_another_and_need_not_have_a_shape() {
     let scene = parsed(
         "[[finger]]\n[[entity]]\ntemplate = \"rubber-ball\"\n\
