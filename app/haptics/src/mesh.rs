@@ -41,7 +41,6 @@ mod fan;
 mod fit;
 mod fold;
 mod hole;
-mod inner_wall;
 mod junction;
 mod labels;
 mod ledge;

@@ -43,9 +43,8 @@ pub enum BodyError {
     },
     /// It has no inside.
     #[error(
-        "a mesh of {faces} faces that is open, has a wall within or cannot be oriented encloses no one volume and has no \
-         inertia of its own; close it, take the wall out, or give `inertia_kg_m2` and `centre_of_mass_m`, or leave out \
-         `mass_kg` and it is fixed"
+        "a mesh of {faces} faces that is open or cannot be oriented encloses no volume and has no inertia of its own; \
+         close it, or give `inertia_kg_m2` and `centre_of_mass_m`, or leave out `mass_kg` and it is fixed"
     )]
     OpenMesh {
         /// How many triangles.

@@ -209,13 +209,13 @@ impl Understood {
 
     /// Consequence for a finger.
     fn felt(&self) -> String {
-        match (self.report.sheets.count, self.mesh.has_inside()) {
-            // Walls within are for nobody.
-            (0, _) => "from outside; a finger does not get in".into(),
-            (_, false) => {
+        let sheets = self.report.sheets.count;
+        match (self.mesh.sides(), self.mesh.has_inside()) {
+            (Sides::Solid, _) => "from outside; a finger does not get in".into(),
+            (Sides::Sheet, false) => {
                 "from both sides, as a sheet: a finger that comes in through a hole is free within, and feels it from inside".into()
             }
-            (sheets, true) => format!(
+            (Sides::Sheet, true) => format!(
                 "solid parts from outside; the others ({sheets}) from both sides, as sheets that a finger gets behind by their rims"
             ),
         }

@@ -459,30 +459,6 @@ fn check_tells_how_a_model_is_understood_and_writes_what_needs_no_repair() {
     }
 }
 
-#[test]
-fn check_tells_of_a_wall_between_two_solids_that_no_finger_gets_there() {
-    // Side by side, the wall between them once.
-    let mut soup = cube();
-    let wide_m = 2.0 * HALF_M;
-    soup.vertices.extend(cube().vertices.iter().map(|vertex| vertex + Vector3::x() * wide_m));
-    let second = cube().faces.into_iter().map(|face| face.map(|vertex| vertex + 8));
-    let is_wall = |face: &[u32; 3]| face.iter().all(|&v| soup.vertices[v as usize].x < 1.5 * HALF_M);
-    let others: Vec<_> = second.filter(|face| !is_wall(face)).collect();
-    soup.faces.extend(others);
-    assert_eq!((soup.vertices.len(), soup.faces.len()), (16, 22));
-    let place = Workplace::new();
-    place.write("rooms.obj", Format::Obj.write(&soup));
-    let said = place.run(["check", "rooms.obj"]);
-    for part in
-        ["1 part within what is closed, where no finger gets", "from outside; a finger does not get in"]
-    {
-        assert!(said.out.contains(part), "`{part}` is missing in: {}", said.out);
-    }
-    for part in ["not closed", "stays open", "one face only", "rims"] {
-        assert!(!said.out.contains(part), "`{part}` is in: {}", said.out);
-    }
-}
-
 /// A name that says nothing is that of a model if the content is one's, else that of a scene.
 #[test]
 fn check_knows_a_model_without_an_ending_by_its_content() {

@@ -18,7 +18,6 @@ use super::repair::area_vector;
 use super::{Bvh, CloseHoles, Face, Link, Mesh, MeshError, MeshReport, Sides, TriangleSoup};
 use super::{fold, hole, junction, order, pinch, repair, topology, winding};
 use nalgebra::Vector3;
-use std::collections::BTreeSet;
 use std::sync::OnceLock;
 use std::sync::atomic::{AtomicU64, Ordering};
 
@@ -90,15 +89,14 @@ impl Mesh {
             (report.touching_edges, report.crowded_edges) = (told.touching_edges, told.crowded_edges);
             pinch::part(&mut triangles, &links, &mut vertices);
         }
-        report.open_holes = hole::largest(&triangles, &links, &vertices, |_| true);
-        report_edges(&triangles, &links, |_| true, &mut report);
+        report.open_holes = hole::largest(&triangles, &links, &vertices);
+        report_edges(&triangles, &links, &mut report);
         let faces: Box<[Face]> =
             (0..triangles.len()).map(|i| face(&triangles[i], &links[i], parts.sides(i), &vertices)).collect();
         triangles.iter().for_each(|triangle| tell(triangle.origin() as usize, triangle.is_lid()));
+        drop((triangles, links));
         let has_inside = faces.iter().any(|face| face.sides == Sides::Solid);
         let is_solid = faces.iter().all(|face| face.sides == Sides::Solid);
-        // Open parts may be walls within closed ones.
-        let mixed = (has_inside && !is_solid).then_some((triangles, links));
         let sides = if is_solid { Sides::Solid } else { Sides::Sheet };
         report.faces = faces.len();
         report.vertices = vertices.len();
@@ -128,9 +126,6 @@ impl Mesh {
         };
         report.crossed = mesh.mark_crossed(&parts);
         mesh.turn_outward(&parts, &mut report);
-        if let Some((triangles, links)) = mixed {
-            mesh.tell_inner_walls((&triangles, &links), &parts, &mut report);
-        }
         let is_fitting;
         (report.narrow_gaps, is_fitting) = mesh.mark_beside(&parts);
         mesh.fit(&is_fitting, &mut report.narrow_gaps);
@@ -141,30 +136,6 @@ impl Mesh {
         mesh.mark_ledges();
         mesh.convex_inner_m = if parts.len() == 1 { mesh.find_convex_inner_m() } else { None };
         Ok((mesh, report))
-    }
-
-    /// Of walls within closed parts, that they are such and not open.
-    fn tell_inner_walls(
-        &self,
-        (triangles, links): (&[Triangle], &[[Link; 3]]),
-        parts: &winding::Parts,
-        report: &mut MeshReport,
-    ) {
-        let walls = self.inner_walls(parts);
-        if walls.is_empty() {
-            return;
-        }
-        let is_told = |face: usize| !walls.contains(&parts.of(face));
-        let first = |part: &usize| parts.first_of_input(*part);
-        let sheets: BTreeSet<usize> = (0..triangles.len())
-            .filter(|&face| self.faces[face].sides == Sides::Sheet && is_told(face))
-            .map(|face| parts.of(face))
-            .collect();
-        (report.sheets, report.boundary_edges, report.turned_edges) = Default::default();
-        walls.iter().for_each(|part| report.inner_walls.note(first(part)));
-        sheets.iter().for_each(|part| report.sheets.note(first(part)));
-        report.open_holes = hole::largest(triangles, links, &self.vertices, is_told);
-        report_edges(triangles, links, is_told, report);
     }
 }
 
@@ -202,15 +173,8 @@ fn face(triangle: &Triangle, links: &[Link; 3], sides: Sides, vertices: &[Vector
     }
 }
 
-/// Of the faces that are told of.
-fn report_edges(
-    triangles: &[Triangle],
-    links: &[[Link; 3]],
-    is_told: impl Fn(usize) -> bool,
-    report: &mut MeshReport,
-) {
-    let told = triangles.iter().zip(links).enumerate().filter(|(face, _)| is_told(*face));
-    for (face, (triangle, own)) in told {
+fn report_edges(triangles: &[Triangle], links: &[[Link; 3]], report: &mut MeshReport) {
+    for (face, (triangle, own)) in triangles.iter().zip(links).enumerate() {
         for link in own {
             if link.is_boundary() {
                 report.boundary_edges.note(triangle.origin() as usize);

@@ -59,15 +59,9 @@ pub(super) fn close(
     triangles.len() > faces
 }
 
-/// The holes that there are beside faces that are told of: how many, and the largest few.
-pub(super) fn largest(
-    triangles: &[Triangle],
-    links: &[[Link; 3]],
-    vertices: &[Vector3<f64>],
-    is_told: impl Fn(usize) -> bool,
-) -> OpenHoles {
+/// The holes that there are: how many, and the largest few.
+pub(super) fn largest(triangles: &[Triangle], links: &[[Link; 3]], vertices: &[Vector3<f64>]) -> OpenHoles {
     let mut loops = loops(triangles, links, vertices);
-    loops.retain(|hole| is_told(hole.face));
     loops.sort_by(|a, b| b.size_m.total_cmp(&a.size_m));
     let mut largest = [None; TOLD];
     for (told, hole) in largest.iter_mut().zip(&loops) {

@@ -140,9 +140,6 @@ pub struct MeshReport {
     pub closed_holes: Finding,
     /// Parts that have no inside, since they are open or cannot be oriented. The face is the first of the part.
     pub sheets: Finding,
-    /// Parts that are not closed and lie within closed ones, where no finger gets to them: walls between solids that touch.
-    /// They are none of [`Self::sheets`], and their rims none of the edges and holes below. The face is the first of the part.
-    pub inner_walls: Finding,
     /// Edges where the mesh ends: the rim of an open mesh, or a crack.
     pub boundary_edges: Finding,
     /// Edges across which inside and outside change places: the mesh cannot be oriented.
@@ -213,12 +210,6 @@ impl fmt::Display for MeshReport {
                 "parts",
                 "not closed: felt from both sides; a finger that comes in by a rim is free within",
             ),
-            (
-                self.inner_walls,
-                "part",
-                "parts",
-                "within what is closed, where no finger gets: walls between solids",
-            ),
             (self.boundary_edges, "edge", "edges", "of one face only: an open rim or a crack"),
             (self.turned_edges, "edge", "edges", "where outside becomes inside: it cannot be oriented"),
         ];
@@ -235,10 +226,9 @@ impl fmt::Display for MeshReport {
                 self.crossed
             )?;
             if self.point_radius_m > 0.0 {
-                let which = if self.sheets.count > 0 { "open parts" } else { "walls within" };
                 write!(
                     f,
-                    "; a finger of radius 0 rolls over this mesh as a ball of {:.2e} m, since {which} cross or touch others",
+                    "; a finger of radius 0 rolls over this mesh as a ball of {:.2e} m, since open parts cross others",
                     self.point_radius_m
                 )?;
             }

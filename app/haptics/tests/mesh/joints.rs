@@ -73,50 +73,7 @@ fn two_rooms_with_a_wall_between_are_one_solid() {
         assert_eq!((faces_of(&mesh, Sides::Solid), faces_of(&mesh, Sides::Sheet)), (20, 2), "{report}");
         assert!(mesh.is_inside(&point(0.1, 0.2, 0.3)) && mesh.is_inside(&point(1.1, 0.2, 0.3)));
         assert!(!mesh.is_inside(&point(1.6, 0.2, 0.3)));
-        // Nothing is open to anybody.
-        assert_eq!((report.inner_walls.count, report.sheets.count), (1, 0), "{report}");
-        assert_eq!((report.boundary_edges.count, report.open_holes.count), (0, 0), "{report}");
     }
-}
-
-#[test]
-fn an_open_part_is_a_wall_within_if_all_of_it_is_within() {
-    let quad = |from: f64, to: f64, x: f64| {
-        let points = [[-0.2, from], [0.2, from], [0.2, to], [-0.2, to]].map(|[y, z]| point(x, y, z));
-        build(cube_and(&points, &[[8, 9, 10, 11]])).1
-    };
-    let told = |report: &MeshReport| {
-        [report.inner_walls.count, report.sheets.count, report.boundary_edges.count, report.open_holes.count]
-    };
-    assert_eq!(told(&quad(-0.2, 0.2, 0.1)), [1, 0, 0, 0]);
-    // With the middles of its faces within, and two corners outside.
-    assert_eq!(told(&quad(-0.2, 0.8, 0.1)), [0, 1, 4, 1]);
-    assert_eq!(told(&quad(-0.2, 0.2, 0.9)), [0, 1, 4, 1]);
-    // One within and one outside, which alone is told as open.
-    let corners = |x: f64| [[-0.2, -0.2], [0.2, -0.2], [0.2, 0.2], [-0.2, 0.2]].map(|[y, z]| point(x, y, z));
-    let points = [corners(0.1), corners(0.9)].concat();
-    let (mesh, report) = build(cube_and(&points, &[[8, 9, 10, 11], [12, 13, 14, 15]]));
-    assert_eq!((told(&report), mesh.sides()), ([1, 1, 4, 1], Sides::Sheet));
-    assert!((report.open_holes.largest[0].unwrap().middle_B[0] - 0.9).abs() < 1e-12);
-    assert_eq!((report.sheets.first, report.inner_walls.first), (Some(14), Some(12)));
-}
-
-#[test]
-fn walls_between_four_rooms_are_within() {
-    let rooms = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0]];
-    let mut soup = together(rooms.map(|[x, z]| moved(make::cuboid([1.0; 3]), [x, 0.0, z])));
-    // Of the second room the wall towards the first is left out.
-    let lies_at = |face: &[u32; 3], axis: usize| face.iter().all(|&v| soup.vertices[v as usize][axis] == 0.5);
-    let is_second = |(at, face): &(usize, &[u32; 3])| {
-        let [x, z] = rooms[at / 12];
-        (x == 1.0 && lies_at(face, 0)) || (z == 1.0 && lies_at(face, 2))
-    };
-    let faces = soup.faces.iter().enumerate().filter(|it| !is_second(it)).map(|(_, face)| *face).collect();
-    soup.faces = faces;
-    assert_eq!(soup.faces.len(), 40);
-    let (mesh, report) = build(soup);
-    assert_eq!(report.sheets.count + report.boundary_edges.count + report.open_holes.count, 0, "{report}");
-    assert!(report.inner_walls.count >= 1 && mesh.has_inside(), "{report}");
 }
 
 #[test]
