@@ -5,7 +5,7 @@
 //! | `/tick` | `phantom3.Tick`, made for the scene | every tick |
 //! | `/events` | `phantom3.Event` | when something happens |
 //! | `/orders` | `phantom3.Order` | when somebody ordered something; not there if nobody did |
-//! | `/scene` | `foxglove.SceneUpdate` | once |
+//! | `/scene`, of large scenes also `/scene/2` and so on | `foxglove.SceneUpdate` | once |
 //! | `/frames` | `foxglove.FrameTransforms` | 50 times a second |
 //! | `/fingers` | `foxglove.SceneUpdate` | 50 times a second |
 //!
@@ -46,6 +46,10 @@ use world::events::{Event, Facts, Kind};
 const CHUNK_NS: u64 = 500_000_000;
 /// Or so many bytes, with many objects.
 const CHUNK_BYTES: usize = 4 << 20;
+/// More than this no chunk has: readers of ours take twice as much.
+pub(super) const MOST_CHUNK_BYTES: usize = 32 << 20;
+/// What a message has besides its content, at most.
+const MESSAGE_HEAD_BYTES: usize = 32;
 /// Between two pictures (ns).
 const PICTURE_NS: u64 = 20_000_000;
 
@@ -87,12 +91,13 @@ pub struct McapFile {
     is_current: bool,
 }
 
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone)]
 struct Channels {
     tick: u16,
     events: u16,
     orders: Option<u16>,
-    scene: u16,
+    /// One for each part, so that players which go back to the last message of each channel show all of them.
+    scene: Vec<u16>,
     frames: u16,
     fingers: u16,
 }
@@ -131,7 +136,7 @@ impl McapFile {
         let beginning = Arc::new(Beginning::default());
         let writes = WholeWrites::new(file, Arc::clone(&beginning));
         let mut writer = options().create(NoSeek::new(writes)).map_err(failed)?;
-        let channels = begin(&mut writer, &names, about).map_err(failed)?;
+        let channels = begin(&mut writer, &names, about, view.scene.len()).map_err(failed)?;
         for (input, why) in about.left_out() {
             say(format_args!("phantom3: {} is recorded without {input}: {why}", shown(&path).display()));
         }
@@ -159,13 +164,19 @@ impl McapFile {
             scene: 0,
             is_current: true,
         };
-        let scene = std::mem::take(&mut file.view.scene);
-        file.put(channels.scene, begins, &scene).map_err(failed)?;
-        file.chunk_bytes = 0;
-        if !may_wait {
-            file.writer.flush().map_err(failed)?;
-        }
+        file.put_scene(begins, may_wait).map_err(failed)?;
         Ok(file)
+    }
+
+    /// What is seen of the scene; nothing of it goes out yet into what may wait for a reader.
+    fn put_scene(&mut self, begins: u64, may_wait: bool) -> Result<(), McapError> {
+        let scene = std::mem::take(&mut self.view.scene);
+        self.beginning.is_held.store(may_wait, Ordering::Relaxed);
+        for (channel, part) in self.channels.scene.clone().into_iter().zip(scene.iter()) {
+            self.put(channel, begins, part)?;
+        }
+        self.beginning.is_held.store(false, Ordering::Relaxed);
+        if may_wait { Ok(()) } else { self.end_chunk() }
     }
 
     /// Of the scene of this number, in a run in which all that is written here was ordered.
@@ -192,7 +203,7 @@ impl McapFile {
 
     /// No row has come, and the file has its earlier content.
     pub fn is_as_before(&self) -> bool {
-        let Beginning { has_content, has_rows } = &*self.beginning;
+        let Beginning { has_content, has_rows, .. } = &*self.beginning;
         has_content.load(Ordering::Relaxed) && !has_rows.load(Ordering::Relaxed)
     }
 
@@ -221,7 +232,11 @@ impl McapFile {
     /// # Errors
     /// If that fails.
     pub fn flush(&mut self) -> Result<(), RecordingError> {
-        self.writer.flush().map_err(|error| self.failed(error))?;
+        self.end_chunk().map_err(|error| self.failed(error))
+    }
+
+    fn end_chunk(&mut self) -> Result<(), McapError> {
+        self.writer.flush()?;
         self.rows += self.chunk_rows;
         self.last_tick = self.last_in_chunk;
         (self.chunk_rows, self.chunk_bytes) = (0, 0);
@@ -360,6 +375,10 @@ impl McapFile {
     }
 
     fn put(&mut self, channel_id: u16, run_tick: u64, data: &[u8]) -> Result<(), McapError> {
+        let bytes = data.len() + MESSAGE_HEAD_BYTES;
+        if self.chunk_bytes > 0 && self.chunk_bytes + bytes > MOST_CHUNK_BYTES {
+            self.end_chunk()?;
+        }
         if self.chunk_bytes == 0 {
             has_memory_for_a_chunk()?;
         }
@@ -367,7 +386,7 @@ impl McapFile {
         let header =
             MessageHeader { channel_id, sequence: self.sequence, log_time: time_ns, publish_time: time_ns };
         self.sequence = self.sequence.wrapping_add(1);
-        self.chunk_bytes += data.len();
+        self.chunk_bytes += bytes;
         self.writer.write_to_known_channel(&header, data)
     }
 
@@ -418,6 +437,7 @@ fn begin(
     writer: &mut Writer<NoSeek<WholeWrites>>,
     names: &Names,
     about: &About,
+    scene_parts: usize,
 ) -> Result<Channels, McapError> {
     let facts = [(ABOUT, about.facts.clone()), (COLUMNS, about::columns_of(names))];
     for (name, metadata) in facts {
@@ -440,10 +460,16 @@ fn begin(
         tick: channel(TICK_TOPIC, schema::TICK)?,
         events: channel("/events", schema::EVENT)?,
         orders: None,
-        scene: channel("/scene", "foxglove.SceneUpdate")?,
+        scene: (1..=scene_parts)
+            .map(|part| channel(&scene_topic(part), "foxglove.SceneUpdate"))
+            .collect::<Result<_, _>>()?,
         frames: channel("/frames", "foxglove.FrameTransforms")?,
         fingers: channel("/fingers", "foxglove.SceneUpdate")?,
     })
+}
+
+fn scene_topic(part: usize) -> String {
+    if part == 1 { "/scene".into() } else { format!("/scene/{part}") }
 }
 
 fn add_channel(
@@ -467,6 +493,8 @@ struct Beginning {
     has_content: AtomicBool,
     /// The first row has come.
     has_rows: AtomicBool,
+    /// Nothing goes out yet.
+    is_held: AtomicBool,
 }
 
 /// Gathers what is written until it is flushed, then writes it whole or, if it does not fit, not at all. Into a file that has
@@ -537,6 +565,9 @@ impl Write for WholeWrites {
     }
 
     fn flush(&mut self) -> io::Result<()> {
+        if self.beginning.is_held.load(Ordering::Relaxed) {
+            return Ok(());
+        }
         let bytes = self.pending.len() as u64;
         if self.file.has_content() && !self.beginning.has_rows.load(Ordering::Relaxed) {
             return self.file.reserve(bytes);
@@ -569,8 +600,47 @@ impl Write for WholeWrites {
 #[cfg(test)]
 mod tests {
     use super::super::opened::OtherContent;
+    use super::super::read::RecordedRun;
     use super::*;
     use std::path::Path;
+
+    fn with_scene(directory: &Path, parts: Vec<Vec<u8>>) -> PathBuf {
+        let path = directory.join("r.mcap");
+        let names = Names { fingers: vec!["f0".into()], ..Names::default() };
+        let mut about = About::default();
+        about.tell("period_ns", "1000000".into());
+        let mut view = View::default();
+        view.scene = parts.into();
+        let file = Opened::recording(&path).expect("a file");
+        let mut file = McapFile::create(file, names, 1_000_000, &about, view).expect("room");
+        for run_tick in 0..3 {
+            let row = Row { run_tick, ..Row::empty() };
+            file.append(&row, &[]).expect("room");
+        }
+        assert_eq!(file.finish().expect("room"), 3);
+        path
+    }
+
+    #[test]
+    fn a_large_scene_goes_into_chunks_that_readers_take() {
+        let directory = tempfile::tempdir().expect("a directory");
+        let parts =
+            vec![vec![0; MOST_CHUNK_BYTES - MESSAGE_HEAD_BYTES], vec![0; 20 << 20], vec![0; 20 << 20]];
+        let path = with_scene(directory.path(), parts);
+        let mut read = RecordedRun::open(&path).expect("sound");
+        let mut rows = 0;
+        while read.next_row().expect("sound").is_some() {
+            rows += 1;
+        }
+        assert_eq!((rows, read.cut()), (3, None));
+        let bytes = std::fs::read(&path).expect("there");
+        let summary = mcap::Summary::read(&bytes).expect("sound").expect("whole");
+        let most = summary.chunk_indexes.iter().map(|chunk| chunk.uncompressed_size).max();
+        assert!(most.is_some_and(|most| most < 40 << 20), "{most:?}");
+        for topic in ["/scene", "/scene/2", "/scene/3"] {
+            assert!(summary.channels.values().any(|channel| channel.topic == topic), "{topic}");
+        }
+    }
 
     #[test]
     fn nothing_is_written_behind_a_write_that_did_not_fit() {

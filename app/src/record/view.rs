@@ -26,6 +26,9 @@ const METRES_PER_NEWTON: f64 = 0.02;
 /// A finger without a radius is drawn with this one (m).
 const POINT_RADIUS_M: f64 = 0.002;
 
+/// A part of the scene's picture has so many bytes at most; an entity takes less (`MOST_FACES`).
+const MOST_PART_BYTES: usize = 24 << 20;
+
 const SOLID: Rgba = [0.55, 0.65, 0.75, 1.0];
 const MOVING: Rgba = [0.85, 0.65, 0.35, 1.0];
 const HIP: Rgba = [0.3, 0.8, 0.3, 0.5];
@@ -38,8 +41,8 @@ const NORMAL_M: f64 = 0.03;
 /// What is drawn.
 #[derive(Debug, Clone, Default)]
 pub struct View {
-    /// A `foxglove.SceneUpdate` of all entities.
-    pub(super) scene: Vec<u8>,
+    /// All entities, as one `foxglove.SceneUpdate` or, if that is too large, as several. One copy serves all recordings.
+    pub(super) scene: Arc<[Vec<u8>]>,
     /// Radius of each finger (m); 0 for a point.
     radii_m: Vec<f64>,
 }
@@ -48,7 +51,7 @@ impl View {
     /// Of a scene, as it is rendered.
     pub fn new(scene: &Scene, entities: &[Entity]) -> Self {
         let radii_m = scene.fingers.iter().map(|finger| finger.radius_m).collect();
-        Self { scene: drawn(scene, entities, &mut Drawn::default()), radii_m }
+        Self { scene: drawn(scene, entities, &mut Drawn::default(), MOST_PART_BYTES).into(), radii_m }
     }
 
     /// A `foxglove.FrameTransforms` of all that moves.
@@ -93,19 +96,24 @@ impl View {
     }
 }
 
-/// A `foxglove.SceneUpdate` of all entities.
-fn drawn<'e>(scene: &Scene, entities: &'e [Entity], made: &mut Drawn<'e>) -> Vec<u8> {
-    let mut out = Message::new();
+/// A `foxglove.SceneUpdate` of all entities; several, if it would have more bytes than this. An entity is in one of them.
+fn drawn<'e>(scene: &Scene, entities: &'e [Entity], made: &mut Drawn<'e>, most_bytes: usize) -> Vec<Vec<u8>> {
+    let (mut parts, mut out) = (Vec::new(), Message::new());
     for (spec, entity) in scene.entities.iter().zip(entities) {
         let moves = spec.motion.is_some();
         let frame = if moves { frame_of(&spec.name) } else { WORLD.into() };
         let pose = if moves { Isometry3::identity() } else { spec.pose };
         let rgba = if moves { MOVING } else { SOLID };
+        let before = out.bytes().len();
         scene_entity(&mut out, 0, &frame, &spec.name, |out| {
             draw(out, &spec.shape, &entity.shape, made, (&pose, rgba));
         });
+        if before > 0 && out.bytes().len() > most_bytes {
+            parts.push(out.cut(before));
+        }
     }
-    out.bytes().to_vec()
+    parts.push(out.into_bytes());
+    parts
 }
 
 /// What the surface is like where a finger of this radius touches it: the normal, and the friction circle in the tangent plane.
@@ -204,8 +212,18 @@ mod tests {
         let (shared, own) = (csg(), csg());
         let entities = [entity(&shared), entity(&shared), entity(&own)];
         let mut made = Drawn::default();
-        let all = drawn(&scene, &entities, &mut made);
+        let all = drawn(&scene, &entities, &mut made, usize::MAX);
         assert_eq!(made.count(), 2);
-        assert_eq!(all, drawn(&scene, &[entity(&own), entity(&own), entity(&own)], &mut Drawn::default()));
+        let alone = [entity(&own), entity(&own), entity(&own)];
+        assert_eq!(all, drawn(&scene, &alone, &mut Drawn::default(), usize::MAX));
+        let [all] = &all[..] else { panic!("{} parts", all.len()) };
+        // All have names of one letter.
+        let each = all.len() / 3;
+        for (most_bytes, parts) in [(0, 3), (each, 3), (2 * each, 2), (3 * each - 1, 2), (3 * each, 1)] {
+            let cut = drawn(&scene, &alone, &mut Drawn::default(), most_bytes);
+            assert_eq!((cut.len(), &cut.concat()), (parts, all), "{most_bytes}");
+            assert!(cut.iter().all(|part| part.len() <= most_bytes.max(each)), "{most_bytes}");
+        }
+        assert_eq!(drawn(&scene, &[], &mut Drawn::default(), 0), [Vec::<u8>::new()], "an empty one");
     }
 }

@@ -28,6 +28,17 @@ impl Message {
         &self.bytes
     }
 
+    /// What is written.
+    pub(super) fn into_bytes(self) -> Vec<u8> {
+        self.bytes
+    }
+
+    /// Takes out the fields before this byte, which one begins at.
+    pub(super) fn cut(&mut self, at: usize) -> Vec<u8> {
+        let behind = self.bytes.split_off(at);
+        std::mem::replace(&mut self.bytes, behind)
+    }
+
     /// Forgets its fields, not its memory.
     pub(super) fn clear(&mut self) {
         self.bytes.clear();

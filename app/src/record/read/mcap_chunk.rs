@@ -6,7 +6,7 @@
 use super::mcap_record::Chunk;
 use std::io::{ErrorKind, Read};
 
-/// The most that a chunk's records may have: chunks of ours have 4 MiB and a message.
+/// The most that a chunk's records may have: chunks of ours have half of it at most.
 const MOST_CHUNK_BYTES: u64 = 64 << 20;
 /// Of a byte of LZ4.
 const MOST_EXPANSION: u64 = 255;
