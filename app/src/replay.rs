@@ -182,7 +182,7 @@ impl Play {
         let names = rig.names(&driver.extras());
         let step = rig.fast_step().map_err(|error| wrong(&error))?;
         let bodies = step.bodies().len();
-        let view = View::new(&rig.scene, step.entities());
+        let view = View::new(&rig.scene, step.entities(), record::shows_scene(records));
         let book = Book::default();
         let (events, event_ends) = growing_event_queue(EVENT_QUEUE);
         let mut hub = Hub::new(vec![event_ends]);

@@ -16,7 +16,7 @@ use crate::outputs::{self, Output};
 use crate::premises::Premises;
 use crate::progress::Progress;
 use crate::record::destination::RunFormat;
-use crate::record::{About, Backpressure, Files, Recorded, View};
+use crate::record::{About, Backpressure, Files, Recorded, View, shows_scene};
 use crate::report::{Report, recording_line};
 use crate::rig::{HandMode, Rig, RigError};
 use crate::row_queue::row_queue;
@@ -159,8 +159,11 @@ impl Parts {
         let book = Book::default();
         let (sender, slow_lists) = mpsc::channel();
         let window = plan.window.as_ref().filter(|_| clock != ClockMode::Virtual);
+        // A window's button begins an MCAP at any time.
+        let is_recorded_as_seen = window.is_some() || shows_scene(&plan.record);
         let means = Means {
             is_shown: window.is_some() || plan.pictures.is_some(),
+            is_recorded_as_seen,
             settings: plan.settings.clone(),
             extras: devices.to_vec(),
             book: book.clone(),
@@ -186,7 +189,7 @@ impl Parts {
         let spectator =
             opened.map(|(window, moments)| Spectator::new(window, moments, &mut hub, book.clone()));
         let spectator = spectator.map(|spectator| spectator.in_real_time(clock == ClockMode::Real));
-        let view = View::new(&rig.scene, step.entities());
+        let view = View::new(&rig.scene, step.entities(), is_recorded_as_seen);
         let directory = plan.settings.recording_directory.value.clone();
         let on_request = spectator.is_some().then(|| OnRequest::new(directory, rig.clone(), view.clone()));
         let (desk, orders) = match &plan.orders {

@@ -64,6 +64,8 @@ pub struct Means {
     pub slow_lists: Option<Sender<SlowList>>,
     /// Whether what runs is shown to anybody.
     pub is_shown: bool,
+    /// Whether recordings show the scene.
+    pub is_recorded_as_seen: bool,
 }
 
 /// A scene that will run once an order has been done.
@@ -347,7 +349,7 @@ impl Desk {
         if let Some(other) = &mut world.other {
             other.number = number;
         }
-        let view = View::new(&self.rig.scene, world.step.entities());
+        let view = View::new(&self.rig.scene, world.step.entities(), self.means.is_recorded_as_seen);
         let shown = self.means.is_shown.then(|| Shown::new(&self.rig, world.step.entities()));
         self.coming.push_back(Coming { rows, rig: self.rig.clone(), view, shown });
         self.take_note(&world.step);

@@ -37,7 +37,7 @@ pub use mcap_file::McapFile;
 pub use opened::{Opened, OtherContent, begin_all};
 pub use record_file::RecordFile;
 pub use recorder::{EventFeed, Recorded, Recorder};
-pub use view::View;
+pub use view::{View, shows_scene};
 pub(crate) use whole_lines::WholeLines;
 
 use crate::book::Book;

@@ -5,6 +5,7 @@
 //! an arrow along the normal and the friction circle.
 //! Boxes, balls, cylinders and what is made of them are drawn exactly, everything else in triangles up to a limit.
 
+use super::destination::RunFormat;
 use super::foxglove::{Rgba, WORLD, arrow, cube, cylinder, frame_in_world, scene_entity, sphere, triangles};
 use super::wire::Message;
 use crate::columns::Names;
@@ -13,6 +14,7 @@ use crate::row::{BodyRow, FingerRow, Row};
 use haptics::{Entity, Shape};
 use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
 use std::f64::consts::TAU;
+use std::path::PathBuf;
 use std::sync::Arc;
 use view::Triangles;
 use world::{Scene, ShapeSpec};
@@ -48,10 +50,13 @@ pub struct View {
 }
 
 impl View {
-    /// Of a scene, as it is rendered.
-    pub fn new(scene: &Scene, entities: &[Entity]) -> Self {
-        let radii_m = scene.fingers.iter().map(|finger| finger.radius_m).collect();
-        Self { scene: drawn(scene, entities, &mut Drawn::default(), MOST_PART_BYTES).into(), radii_m }
+    /// Of a scene, as it is rendered; its picture is made only for recordings that have one, for it may take long and much memory.
+    pub fn new(scene: &Scene, entities: &[Entity], has_picture: bool) -> Self {
+        let picture = || drawn(scene, entities, &mut Drawn::default(), MOST_PART_BYTES);
+        Self {
+            scene: has_picture.then(picture).unwrap_or_default().into(),
+            radii_m: scene.fingers.iter().map(|finger| finger.radius_m).collect(),
+        }
     }
 
     /// A `foxglove.FrameTransforms` of all that moves.
@@ -94,6 +99,11 @@ impl View {
             });
         }
     }
+}
+
+/// Whether one of these recordings has a picture of the scene.
+pub fn shows_scene(files: &[PathBuf]) -> bool {
+    files.iter().any(|file| RunFormat::of(file).is_ok_and(|format| format == RunFormat::Mcap))
 }
 
 /// A `foxglove.SceneUpdate` of all entities; several, if it would have more bytes than this. An entity is in one of them.
@@ -194,6 +204,19 @@ mod tests {
     use super::*;
     use std::path::Path;
     use world::CsgOp;
+
+    #[test]
+    fn what_has_no_picture_of_the_scene_makes_none() {
+        let text = "[[finger]]\n[[entity]]\nname = \"a\"\nshape = { kind = \"sphere\", radius_m = 0.05 }\n";
+        let scene = Scene::parse(text, Path::new("scene.toml")).unwrap();
+        let ball = haptics::Sphere::new(0.05).unwrap();
+        let entities = [Entity::new(ball, Isometry3::identity(), 1000.0).unwrap()];
+        assert_eq!(View::new(&scene, &entities, true).scene.len(), 1);
+        let without = View::new(&scene, &entities, false);
+        assert_eq!((without.scene.len(), without.radii_m.len()), (0, 1));
+        let of = |files: &[&str]| shows_scene(&files.iter().map(|file| (*file).into()).collect::<Vec<_>>());
+        assert_eq!([of(&[]), of(&["a.csv", "-"]), of(&["a.csv", "b.mcap"])], [false, false, true]);
+    }
 
     #[test]
     fn the_triangles_of_a_solid_are_made_once_for_all_that_have_it() {

@@ -43,7 +43,7 @@ impl Run {
         let rig = rig();
         let driver = VirtualDriver::open(&rig.driver_config(ClockMode::Virtual)).expect("devices");
         let step = rig.fast_step().expect("a step");
-        let view = View::new(&rig.scene, step.entities());
+        let view = View::new(&rig.scene, step.entities(), true);
         let files = Files {
             record: vec![place.path().join("whole.csv")],
             events: Vec::new(),
