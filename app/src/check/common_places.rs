@@ -35,6 +35,47 @@ impl Effect<'_> {
     }
 }
 
+/// Places where as many as can be found meet of those constant fields whose force has a part along that of one of them: in what
+/// pulls the other way, and beside that.
+pub(super) fn forceful_places(pulls: &[(&Field, Vector3<f64>)]) -> Vec<Vector3<f64>> {
+    let mut places = Vec::new();
+    for (at, (_, along_W)) in pulls.iter().enumerate() {
+        let is_with = |pull_W: &Vector3<f64>| pull_W.dot(along_W) > 0.0;
+        let (with, against): (Vec<_>, Vec<_>) = pulls.iter().partition(|(_, pull_W)| is_with(pull_W));
+        // If all are with it, it is a group as others.
+        if with.len() < 2 || against.is_empty() {
+            continue;
+        }
+        let with: Vec<Effect<'_>> = with.iter().map(|(field, _)| Effect::Field(field)).collect();
+        let first = pulls[..at].iter().filter(|(_, pull_W)| is_with(pull_W)).count();
+        let Some((group, place_W)) = group_from(&with, vec![first]) else { continue };
+        places.push(place_W);
+        let against: Vec<&Field> = against.iter().map(|(field, _)| *field).collect();
+        places.extend(ways_out(&against, &place_W).filter_map(|out_W| meeting(&with, &group, out_W)));
+    }
+    places
+}
+
+/// Places about where none of these is felt any more, on ways in all directions; none where they are not felt at all.
+fn ways_out(fields: &[&Field], from_W: &Vector3<f64>) -> impl Iterator<Item = Vector3<f64>> {
+    let is_free = |p_W: &Vector3<f64>| fields.iter().all(|field| field.region().weight(p_W) == 0.0);
+    let out = move |along: Vector3<f64>| {
+        let lengths = (0..DOUBLINGS).map(|doubling| BELOW_M * f64::from(1 << doubling));
+        lengths.map(|length_m| from_W + along * length_m).find(is_free)
+    };
+    let all = (!is_free(from_W)).then(directions);
+    all.into_iter().flatten().filter_map(out)
+}
+
+/// To the corners, edges and faces of a cube.
+pub(super) fn directions() -> impl Iterator<Item = Vector3<f64>> {
+    let signs = [-1.0, 0.0, 1.0];
+    let all = signs.into_iter().flat_map(move |x| {
+        signs.into_iter().flat_map(move |y| signs.into_iter().map(move |z| Vector3::new(x, y, z)))
+    });
+    all.filter(|d| *d != Vector3::zeros()).map(|d| d.normalize())
+}
+
 /// Places of groups of effects, and of effects with entities.
 pub(super) fn common_places(effects: &[Effect<'_>], entities: &[Entity]) -> Vec<Vector3<f64>> {
     let mut places = Vec::new();
@@ -45,14 +86,15 @@ pub(super) fn common_places(effects: &[Effect<'_>], entities: &[Entity]) -> Vec<
         } else {
             (at + 1..effects.len()).map(|other| vec![at, other]).chain([alone]).collect()
         };
-        places.extend(begins.into_iter().filter_map(|begin| place_of_group(effects, begin)));
+        let place = |begin| Some(group_from(effects, begin)?.1);
+        places.extend(begins.into_iter().filter_map(place));
         places.extend(entities.iter().filter_map(|entity| place_in(first, entity)));
     }
     places
 }
 
-/// A place where these are felt, and as many others as can be found; `None`: they have no place in common.
-fn place_of_group(effects: &[Effect<'_>], mut group: Vec<usize>) -> Option<Vector3<f64>> {
+/// These and as many others as can be found that are felt at one place, and the place; `None`: these have none in common.
+fn group_from(effects: &[Effect<'_>], mut group: Vec<usize>) -> Option<(Vec<usize>, Vector3<f64>)> {
     let mut place_W = meeting(effects, &group, Vector3::zeros())?;
     for other in 0..effects.len() {
         if group.contains(&other) {
@@ -64,7 +106,7 @@ fn place_of_group(effects: &[Effect<'_>], mut group: Vec<usize>) -> Option<Vecto
             None => drop(group.pop()),
         }
     }
-    Some(place_W)
+    Some((group, place_W))
 }
 
 fn meeting(effects: &[Effect<'_>], group: &[usize], from_W: Vector3<f64>) -> Option<Vector3<f64>> {
@@ -103,6 +145,8 @@ const FEW: usize = 16;
 /// Of leading a place.
 const ROUNDS: usize = 20;
 const ARRIVED_M: f64 = 1e-6;
+/// Of a way out of fields: up to 130 m.
+const DOUBLINGS: u32 = 18;
 /// With less a field is hardly felt.
 const LEAST_WEIGHT: f64 = 0.25;
 /// As deep as a finger presses.

@@ -9,11 +9,11 @@
 //! what one field may pull.
 //! Cost: some hundred places for each thing that others reach into, and none for things that lie apart; of heaps, one in so many
 //! of these that all things are touched [`MOST_LOOKS`] times or less, which is told; of effects, as many groups as there are
-//! effects, or pairs of a few.
+//! effects, or pairs of a few, and of constant fields one more for each, along its force.
 
 #![allow(non_snake_case)] // Frames are capital letters.
 
-use super::common_places::{Effect, common_places};
+use super::common_places::{Effect, common_places, directions, forceful_places};
 use super::warnings::Stands;
 use crate::rig::{Rig, in_words};
 use haptics::{
@@ -29,6 +29,7 @@ pub(super) fn too_much(rig: &Rig, entities: &[Entity], stands: &mut Stands) -> V
     let mut found = Found::default();
     let (near_all, radii) = (neighbours(entities), radii(rig));
     let every = every(&near_all, radii.len());
+    let common: Vec<_> = world.common_places().into_iter().chain(world.forceful_places()).collect();
     for radius_m in radii {
         for (index, near) in near_all.iter().enumerate().filter(|(_, near)| !near.is_empty()) {
             let above = drawn_at(&entities[index], radius_m);
@@ -37,9 +38,9 @@ pub(super) fn too_much(rig: &Rig, entities: &[Entity], stands: &mut Stands) -> V
                 world.judge((near, entities[index].space), radius_m, &place_W, stands, &mut found);
             }
         }
-        for place_W in world.common_places() {
-            let near = world.near(&place_W, radius_m);
-            world.judge((&near, WORLD), radius_m, &place_W, stands, &mut found);
+        for place_W in &common {
+            let near = world.near(place_W, radius_m);
+            world.judge((&near, WORLD), radius_m, place_W, stands, &mut found);
         }
     }
     let mut told = found.told(|thing| world.name(thing));
@@ -223,6 +224,15 @@ impl<'a> World<'a> {
         common_places(&effects, self.entities)
     }
 
+    /// Places where constant forces add up that others take away from elsewhere.
+    fn forceful_places(&self) -> Vec<Vector3<f64>> {
+        let pulls = self.fields.iter().filter_map(|field| match field.kind() {
+            FieldKind::Constant { force_W } => Some((field, *force_W)),
+            _ => None,
+        });
+        forceful_places(&pulls.collect::<Vec<_>>())
+    }
+
     /// Entities of the world itself that a finger may touch there.
     fn near(&self, place_W: &Vector3<f64>, radius_m: f64) -> Vec<u32> {
         let is_near = |entity: &Entity| {
@@ -342,7 +352,8 @@ impl Found {
 impl Kind {
     fn told(self, names: &str, sum: &Sum) -> String {
         let (value, limit, at) = (sum.value, sum.limit, sum.place_W);
-        let there = format!("a finger at ({:.3}, {:.3}, {:.3}) feels", at.x, at.y, at.z);
+        let [x, y, z] = [at.x, at.y, at.z].map(in_micrometres);
+        let there = format!("a finger at ({x}, {y}, {z}) feels");
         match self {
             Self::Contacts => format!(
                 "{names} together may buzz: {there} {value:.0} N/m of them, and a lightly held Premium stands {limit:.0}"
@@ -369,6 +380,12 @@ impl Kind {
             }
         }
     }
+}
+
+/// Fields go from nothing to all within a millimetre or less: in millimetres a place would not have what is told of it.
+fn in_micrometres(length_m: f64) -> f64 {
+    // No negative zero.
+    (length_m * 1e6).round() / 1e6 + 0.0
 }
 
 /// Of each entity that fingers feel, itself and those in its space that may reach into it; ascending.
@@ -433,15 +450,6 @@ fn drawn_at(entity: &Entity, finger_radius_m: f64) -> Vec<Vector3<f64>> {
     directions().filter_map(above).collect()
 }
 
-/// To the corners, edges and faces of a cube.
-fn directions() -> impl Iterator<Item = Vector3<f64>> {
-    let signs = [-1.0, 0.0, 1.0];
-    let all = signs.into_iter().flat_map(move |x| {
-        signs.into_iter().flat_map(move |y| signs.into_iter().map(move |z| Vector3::new(x, y, z)))
-    });
-    all.filter(|d| *d != Vector3::zeros()).map(|d| d.normalize())
-}
-
 /// Of the scene's fingers, each once.
 fn radii(rig: &Rig) -> Vec<f64> {
     let mut radii: Vec<f64> = rig.scene.fingers.iter().map(|finger| finger.radius_m).collect();
@@ -494,6 +502,13 @@ mod tests {
         let told = of_forces(&[along(7, 9.0, 0.0), along(8, 9.0, 0.0), along(9, -1.0, 0.0)], &[]);
         assert_eq!(told.map(|(things, ..)| things), Some(vec![7, 8]));
         assert_eq!(value(&[], &[along(0, 50.0, 0.0)]), None);
+    }
+
+    #[test]
+    fn places_are_told_to_a_micrometre() {
+        let sum = Sum { value: 12.0, limit: 10.0, place_W: Vector3::new(0.0123456, -1e-9, 2.0) };
+        let told = Kind::Force.told("a, b", &sum);
+        assert!(told.contains(" at (0.012346, 0, 2) feels 12.0 N"), "{told}");
     }
 
     #[test]
