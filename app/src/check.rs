@@ -13,6 +13,7 @@ mod measures;
 pub(crate) mod model_file;
 mod near;
 mod patch_file;
+mod remainder;
 mod report;
 mod stands;
 mod summary;

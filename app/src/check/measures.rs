@@ -5,6 +5,7 @@
 //! file is read for its vertices. The mass is the one that a run has, also where the
 //! scene gives a density. What entities share is measured once.
 
+use super::remainder::Remainder;
 use crate::per_shape::PerShape;
 use crate::rig::Rig;
 use haptics::{Csg, Entity, Shape};
@@ -13,7 +14,7 @@ use physics::collide::bounding_ball;
 use serde_json::{Value, json};
 use std::collections::BTreeMap;
 use std::path::PathBuf;
-use view::shapes::triangles;
+use view::shapes::{least_drawn_m, triangles};
 use world::{EntityKind, MeshSpec, SceneEntity, ShapeSpec, model};
 
 /// What can be measured of an entity.
@@ -27,13 +28,21 @@ pub(super) struct Measures {
     pub(super) size_m: Option<[f64; 3]>,
     /// Whether it has none.
     is_endless: bool,
-    /// Of a solid joined of others nothing is left that could be drawn or felt.
-    pub(super) is_nothing: bool,
+    /// A solid joined of others of which nothing is drawn.
+    pub(super) undrawn: Option<Undrawn>,
     /// The middle of that, in the world (m).
     pub(super) middle_m: [f64; 3],
     /// `None`: it is fixed.
     pub(super) mass_kg: Option<f64>,
     pub(super) density_kg_m3: Option<f64>,
+}
+
+/// A solid without triangles.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Undrawn {
+    pub(super) remainder: Remainder,
+    /// What is thinner may not be drawn (m).
+    pub(super) least_drawn_m: f64,
 }
 
 impl Measures {
@@ -63,7 +72,10 @@ impl Measures {
             Some(mesh) => measured.seen.corners(mesh),
             None => measured.felt.of(&entity.shape, || corners(&spec.shape, &entity.shape)),
         };
-        let is_nothing = around.is_none() && matches!(&entity.shape, Shape::Csg(csg) if has_an_end(csg));
+        let undrawn = match &entity.shape {
+            Shape::Csg(csg) if around.is_none() => measured.undrawn.of(&entity.shape, || undrawn(csg)),
+            _ => None,
+        };
         let middle = around.map_or_else(Vector3::zeros, |[least, most]| 0.5 * (least + most));
         // A unit of density makes what the volume is.
         let mass_of_one = || Some(physics::MassProperties::of_density(&entity.shape, 1.0).ok()?.mass_kg);
@@ -73,8 +85,8 @@ impl Measures {
             kind: spec.shape.kind(),
             is_around: spec.kind == EntityKind::Environment,
             size_m: around.map(|[least, most]| (most - least).into()),
-            is_endless: around.is_none() && only_seen.is_none() && !is_nothing,
-            is_nothing,
+            is_endless: around.is_none() && only_seen.is_none() && undrawn.is_none(),
+            undrawn,
             middle_m: (spec.pose * Point3::from(middle)).coords.into(),
             mass_kg,
             density_kg_m3: mass_kg.zip(volume_m3).map(|(mass_kg, volume_m3)| mass_kg / volume_m3),
@@ -100,7 +112,9 @@ impl std::fmt::Display for Measures {
         match self.size_m {
             Some([x, y, z]) => write!(f, ", {} x {} x {} m", short(x), short(y), short(z))?,
             None if self.is_endless => write!(f, ", without an end")?,
-            None if self.is_nothing => write!(f, ", nothing is left of it")?,
+            None if self.undrawn.is_some_and(|it| it.remainder == Remainder::Nothing) => {
+                write!(f, ", nothing is left of it")?;
+            }
             None => write!(f, ", size not measured")?,
         }
         // Triangles of solids that are drawn lie beside their places by roundings.
@@ -119,6 +133,7 @@ impl std::fmt::Display for Measures {
 struct Measured<'e> {
     /// The boxes around what runs, in its own frame (m); `None`: it has no end.
     felt: PerShape<'e, Option<[Vector3<f64>; 2]>>,
+    undrawn: PerShape<'e, Option<Undrawn>>,
     volumes_m3: PerShape<'e, Option<f64>>,
     seen: SeenMeshes,
 }
@@ -134,6 +149,11 @@ impl SeenMeshes {
         let scale = Vector3::from(mesh.scale);
         around(corners.into_iter().map(|corner| corner.component_mul(&scale)))
     }
+}
+
+/// `None`: it is not drawn because it has no end.
+fn undrawn(csg: &Csg) -> Option<Undrawn> {
+    has_an_end(csg).then(|| Undrawn { remainder: Remainder::of(csg), least_drawn_m: least_drawn_m(csg) })
 }
 
 /// It has nothing far away from where it is described.

@@ -9,6 +9,7 @@
 #![allow(non_snake_case)] // Frames are capital letters.
 
 use super::measures::{Measures, short};
+use super::remainder::Remainder;
 use crate::rig::{Rig, in_words};
 use nalgebra::{Quaternion, Vector3};
 use world::{MassSpec, Scene, SceneEntity, ShapeSpec};
@@ -16,7 +17,7 @@ use world::{MassSpec, Scene, SceneEntity, ShapeSpec};
 /// All of them.
 pub(super) fn all(rig: &Rig, measures: &[Measures]) -> Vec<String> {
     let mut found: Vec<String> = measures.iter().filter_map(|it| length(rig, it)).collect();
-    found.extend(measures.iter().filter_map(nothing));
+    found.extend(measures.iter().filter_map(not_drawn));
     found.extend(measures.iter().filter_map(mass));
     found.extend(measures.iter().flat_map(|it| turning(rig, it)));
     found.extend(measures.iter().filter_map(|it| spread(rig, it)));
@@ -61,13 +62,20 @@ fn length(rig: &Rig, it: &Measures) -> Option<String> {
         .then(|| format!("{name} is {} m long, finer than a hair; lengths are in metres", short(length_m)))
 }
 
-fn nothing(it: &Measures) -> Option<String> {
-    it.is_nothing.then(|| {
-        format!(
-            "of {} nothing is left, and nobody feels it; of a difference the first child is what the others are taken away from, \
-             and all children of an intersection have to meet",
-            it.name
-        )
+fn not_drawn(it: &Measures) -> Option<String> {
+    let (name, undrawn) = (&it.name, it.undrawn?);
+    let why = "of a difference the first child is what the others are taken away from, and all children of an intersection \
+               have to meet";
+    let least_m = short(undrawn.least_drawn_m);
+    Some(match undrawn.remainder {
+        Remainder::Nothing => format!("of {name} nothing is left, and nobody feels it; {why}"),
+        Remainder::Something => format!(
+            "{name} is felt but not drawn, for it is too thin: in a solid of its size what is thinner than {least_m} m may be \
+             left out of pictures"
+        ),
+        Remainder::Unknown => format!(
+            "of {name} nothing is drawn, for nothing is left or all of it is thinner than {least_m} m; {why}"
+        ),
     })
 }
 

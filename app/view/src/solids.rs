@@ -10,6 +10,8 @@ use nalgebra::{Matrix3, Point3, SymmetricEigen, Vector3};
 
 /// Cells along each side.
 const CELLS: usize = 64;
+/// Of the extent: a grid that is not aligned with what is round numbers meets no face edge-on.
+const REACH: f64 = 1.0173;
 /// Halvings of a grid's edge to find where the boundary crosses it: to a billionth of its length.
 const HALVINGS: usize = 30;
 /// Normals that differ less look smooth (rad).
@@ -29,6 +31,11 @@ pub(crate) fn triangles(csg: &Csg) -> Triangles {
     Grid::over(csg).contour()
 }
 
+/// What is thinner may not be drawn (m).
+pub(crate) fn least_drawn_m(csg: &Csg) -> f64 {
+    2.0 * REACH * csg.extent_m() / CELLS as f64
+}
+
 struct Grid<'c> {
     csg: &'c Csg,
     least_m: f64,
@@ -39,10 +46,8 @@ struct Grid<'c> {
 
 impl<'c> Grid<'c> {
     fn over(csg: &'c Csg) -> Self {
-        // A grid that is not aligned with what is round numbers meets no face edge-on.
-        let reach_m = 1.0173 * csg.extent_m();
-        let mut grid =
-            Self { csg, least_m: -reach_m, step_m: 2.0 * reach_m / CELLS as f64, is_inside: Vec::new() };
+        let least_m = -REACH * csg.extent_m();
+        let mut grid = Self { csg, least_m, step_m: least_drawn_m(csg), is_inside: Vec::new() };
         let points = |k: usize| [k % (CELLS + 1), k / (CELLS + 1) % (CELLS + 1), k / (CELLS + 1).pow(2)];
         grid.is_inside = (0..(CELLS + 1).pow(3))
             .map(|k| {

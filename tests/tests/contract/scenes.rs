@@ -208,8 +208,32 @@ fn check_tells_of_solids_of_which_nothing_is_left() {
         .chain([solid("swapped", "difference", 0.2), solid("bitten", "difference", 0.05)])
         .chain([solid("apart", "intersection", 0.015), solid("slice", "intersection", 0.05)])
         .collect::<String>();
-    place.write("scene.toml", &scene);
+    // A plate of 1 mm is felt, but is thinner than a cell of the grid that solids are drawn in; so is one of 0.01 mm.
+    let plate = |name: &str, x: f64| {
+        let cube = "shape = { kind = \"box\", size_m = [0.1, 0.1, 0.1] }";
+        format!(
+            "[[entity]]\nname = \"{name}\"\nshape = {{ kind = \"csg\", op = \"difference\", children = [{{ {cube} }}, \
+             {{ {cube}, position_m = [{x}, 0.0, 0.0] }}] }}\n"
+        )
+    };
+    place.write("scene.toml", scene + &plate("thin", 0.001) + &plate("foil", 0.00001) + &plate("gone", 0.0));
     let said = check(&place, &["scene.toml"]);
+    for name in ["thin", "foil"] {
+        assert!(
+            said.out.contains(&format!("{name} is felt but not drawn, for it is too thin")),
+            "{}",
+            said.out
+        );
+        assert!(said.out.contains(&format!("{name}: csg, size not measured")), "{}", said.out);
+    }
+    assert!(
+        said.out.contains("of gone nothing is drawn, for nothing is left or all of it is thinner"),
+        "{}",
+        said.out
+    );
+    for name in ["thin", "foil", "gone"] {
+        assert!(!said.out.contains(&format!("of {name} nothing is left, and")), "{}", said.out);
+    }
     for (name, is_nothing) in [("swapped", true), ("bitten", false), ("apart", true), ("slice", false)] {
         let is_told = said.out.contains(&format!("of {name} nothing is left, and nobody feels it"));
         let is_measured = said.out.contains(&format!("{name}: csg, nothing is left of it"));
