@@ -115,6 +115,8 @@ pub struct Tally {
     pub stepped_then: u64,
     /// The most bodies that waited in one.
     pub most_held: usize,
+    /// Ticks in which fingers felt less of what had not been handed over.
+    pub gave_way: u64,
     /// How often a force was cut because nothing moved for it.
     pub cuts: u64,
     /// The most that was cut at once (N).
@@ -377,6 +379,7 @@ impl FastLoop {
         self.tally.held_ticks += u64::from(held > 0);
         self.tally.stepped_then += if held > 0 { awake as u64 } else { 0 };
         self.tally.most_held = self.tally.most_held.max(held);
+        self.tally.gave_way += u64::from(self.step.gave_way() > 0);
         for cut in self.step.cuts() {
             self.tally.cuts += 1;
             self.tally.most_cut_n = self.tally.most_cut_n.max(cut.force_n);

@@ -231,6 +231,11 @@ impl FastStep {
         })
     }
 
+    /// Touches that were felt with less in the last tick, since what they touch had not been handed over.
+    pub fn gave_way(&self) -> usize {
+        self.objects.gave_way
+    }
+
     /// From now on no more of what moves than this is stepped in a tick here ([`Manipulation::step_at_most`]).
     pub fn step_at_most(&mut self, bodies: usize) {
         self.objects.most_stepped = bodies;
@@ -339,6 +344,9 @@ impl FastStep {
                 self.objects.owe(index, row.force_on_user - wanted_W, finger, felt);
             }
             command.devices[finger.device].force_on_user_n = finger.mount.force_to_device(row.force_on_user);
+        }
+        for (finger, entity) in self.objects.given_up() {
+            self.fingers[finger].finger.forget(entity);
         }
     }
 

@@ -127,6 +127,13 @@ impl fmt::Display for Report {
                 "in turns     {ticks} ticks had no time for all that moves; it moved {mean} in the mean, and up to {most} waited for their turn"
             )?;
         }
+        if tally.gave_way > 0 {
+            let ticks = tally.gave_way;
+            writeln!(
+                f,
+                "gave way     {ticks} ticks in which fingers felt less of things that had not been handed over to them yet"
+            )?;
+        }
         if tally.crowded > 0 {
             let crowded = tally.crowded;
             writeln!(

@@ -27,6 +27,10 @@ use crate::slow_thread::SlowRemains;
 const SLOW_EVERY: u32 = 10;
 /// A finger touches no more bodies at once.
 const MOST_TOUCHED: usize = 16;
+/// The most that is felt of what has not been handed over \[N\], and from where on its contact is given up: some centimetres deep.
+const MOST_UNTIL_IT_COMES_N: f64 = 3.0;
+const GIVEN_UP_N: f64 = 20.0;
+const MOST_GIVEN_UP: usize = 64;
 /// Ticks that a single step of the objects makes up for at most.
 const MOST_TICKS: f64 = 4.0;
 
@@ -69,6 +73,10 @@ pub struct Objects {
     pub(super) is_paused: bool,
     /// What was moved, as the slow list has to know it.
     pub(super) moved: Moved,
+    /// Contacts with what has not been handed over that are given up: fingers and entities.
+    given_up: Vec<(usize, usize)>,
+    /// Touches that gave way in the last tick, since what they touch had not been handed over.
+    pub(super) gave_way: usize,
     /// The most bodies that a tick steps.
     pub(super) most_stepped: usize,
     /// What the last tick took.
@@ -117,6 +125,8 @@ impl Objects {
             stands_still: false,
             is_paused: false,
             moved: Moved::default(),
+            given_up: Vec::with_capacity(room.min(MOST_GIVEN_UP)),
+            gave_way: 0,
             most_stepped: usize::MAX,
             made: Made::default(),
             stepped_s: 0.0,
@@ -326,6 +336,7 @@ impl Objects {
             &mut self.ticks,
             dt_s,
         );
+        self.give_way();
         for (row, tick) in rows.iter_mut().zip(&self.ticks) {
             row.force_on_user += tick.force_on_user_W;
             row.torque_on_user += tick.torque_on_user_W;
@@ -341,6 +352,32 @@ impl Objects {
         for pull in &self.pulls[..self.felt_pulls] {
             rows[pull.finger].force_on_user += pull.force_on_user_W;
         }
+    }
+
+    /// What has not been handed over yet stands still, and is no wall: a finger feels so much of it, and goes through.
+    fn give_way(&mut self) {
+        self.gave_way = 0;
+        let Some(lists) = &self.lists else { return };
+        for touch in &mut self.touches {
+            let is_on_its_way =
+                |body: &usize| self.manipulation.standing(*body).is_away() && !lists.hand_over.holds(*body);
+            let pressed_n = touch.force_on_user_W.norm();
+            if pressed_n > MOST_UNTIL_IT_COMES_N
+                && self.manipulation.body_of(touch.entity).filter(is_on_its_way).is_some()
+            {
+                touch.force_on_user_W *= MOST_UNTIL_IT_COMES_N / pressed_n;
+                self.gave_way += 1;
+                // What comes later must not find a spring of any length.
+                if pressed_n > GIVEN_UP_N && self.given_up.len() < self.given_up.capacity() {
+                    self.given_up.push((touch.finger, touch.entity));
+                }
+            }
+        }
+    }
+
+    /// The contacts, by finger and entity, that end with this tick.
+    pub(super) fn given_up(&mut self) -> impl Iterator<Item = (usize, usize)> + '_ {
+        self.given_up.drain(..)
     }
 
     /// After all, the force on the user of a finger was changed by so much (N). The bodies that it touches have got the other

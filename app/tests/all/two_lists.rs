@@ -96,6 +96,37 @@ fn a_slow_cube_that_nobody_hands_over_is_felt_as_one_that_is_fixed() {
 }
 
 #[test]
+fn what_nobody_hands_over_is_no_wall_and_is_not_flung_when_it_comes() {
+    let row = cube("mass_kg = 0.1\ngrid = { count = [10, 1, 1], spacing_m = [0.1, 1, 1] }");
+    for speed_m_s in [0.2, 1.5, 5.0] {
+        let mut run = Run::new(&format!("{ALL_SLOW}{STANDING}{row}"));
+        let (mut most_n, mut touched, mut gave_way) = (0.0_f64, 0, 0);
+        let along = |tick: u64| -0.1 + speed_m_s * 1e-3 * tick as f64;
+        let ticks = (1..).find(|tick| along(*tick) > 0.805).unwrap_or(0);
+        for tick in 0..ticks {
+            let felt = run.tick([along(tick), 0.03, 0.0], false);
+            most_n = most_n.max(felt.force_on_user.norm());
+            touched += u64::from(felt.entity.is_some());
+            gave_way += u64::from(run.step.gave_way() > 0);
+        }
+        assert!((2.9..=3.0 + 1e-12).contains(&most_n), "{speed_m_s} m/s: {most_n}");
+        assert!(gave_way > 0 && touched > gave_way && run.here() == 0, "{touched} {gave_way}");
+        // The slow list goes on, while the finger stays where it is: within the ninth.
+        let mut fastest_m_s = 0.0_f64;
+        for _ in 0..200 {
+            let felt = run.tick([along(ticks), 0.03, 0.0], true);
+            // 500 N/m and 20 mm: it is pushed out by that at most.
+            assert!(felt.force_on_user.norm() < 10.0 + 1e-9, "{}", felt.force_on_user);
+            let speeds = run.step.bodies().iter().map(|body| body.velocity.norm());
+            fastest_m_s = fastest_m_s.max(speeds.fold(0.0, f64::max));
+        }
+        assert!(run.here() > 0);
+        // As fast as a spring of 20 mm throws it, 70 rad/s.
+        assert!(fastest_m_s < 0.02 * (500.0_f64 / MASS).sqrt(), "{speed_m_s} m/s: {fastest_m_s}");
+    }
+}
+
+#[test]
 fn a_large_island_that_has_not_come_yet_is_felt_as_one_that_is_fixed_until_all_of_it_is_there() {
     let row =
         |mass: &str| cube(&format!("{mass}\ngrid = {{ count = [60, 1, 1], spacing_m = [0.04, 1, 1] }}"));
