@@ -115,14 +115,14 @@ fn what_nobody_hands_over_is_no_wall_and_is_not_flung_when_it_comes() {
         let mut fastest_m_s = 0.0_f64;
         for _ in 0..200 {
             let felt = run.tick([along(ticks), 0.03, 0.0], true);
-            // 500 N/m and 20 mm: it is pushed out by that at most.
-            assert!(felt.force_on_user.norm() < 10.0 + 1e-9, "{}", felt.force_on_user);
+            // 500 N/m and half of the cube, with the damper at a metre per second and more.
+            assert!(felt.force_on_user.norm() < 15.0, "{}", felt.force_on_user);
             let speeds = run.step.bodies().iter().map(|body| body.velocity.norm());
             fastest_m_s = fastest_m_s.max(speeds.fold(0.0, f64::max));
         }
-        assert!(run.here() > 0);
-        // As fast as a spring of 20 mm throws it, 70 rad/s.
-        assert!(fastest_m_s < 0.02 * (500.0_f64 / MASS).sqrt(), "{speed_m_s} m/s: {fastest_m_s}");
+        assert!(run.step.handed().expect("two lists").1.came > 0);
+        // As fast as a spring of 30 mm throws it, 70 rad/s.
+        assert!(fastest_m_s < 0.03 * (500.0_f64 / MASS).sqrt(), "{speed_m_s} m/s: {fastest_m_s}");
     }
 }
 
