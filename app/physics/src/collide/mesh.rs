@@ -15,7 +15,6 @@ use nalgebra::{Isometry3, Point3, Vector3};
 
 use super::mesh_ball::{self, Ball};
 use super::mesh_other::{Other, Solidity};
-use super::mesh_spread::Spread;
 use super::{ContactPoint, ContactPoints, PairMemory, Solid};
 use super::{mesh_plane, mesh_ring, mesh_solid};
 
@@ -84,7 +83,6 @@ fn against(
         mesh_plane::contact_points(mesh, &normal_M, offset_m, reach_m, memory, &mut told);
         return;
     }
-    memory.patches.spread = Spread::elsewhere(memory.is_soft);
     match other {
         Shape::Form(Form::Sphere(sphere)) => {
             let ball = Ball { centre_M: X_MO.translation.vector, radius_m: sphere.radius_m() };

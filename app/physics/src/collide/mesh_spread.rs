@@ -26,7 +26,7 @@ pub(crate) struct Spread {
     chosen: [u32; MAX_POINTS],
     /// How often every second one was left out.
     halvings: u32,
-    /// A few stand for all: there are too many, or they are not on a plane.
+    /// A few stand for all, for there are too many.
     is_crowded: bool,
     /// Ticks until they are counted again.
     waits: u32,
@@ -36,11 +36,6 @@ impl Spread {
     /// Whether a few vertices stand for many that press softly.
     pub(crate) fn is_crowded(&self) -> bool {
         self.is_crowded
-    }
-
-    /// Where others than planes are touched.
-    pub(super) fn elsewhere(is_soft: bool) -> Self {
-        Self { is_crowded: is_soft, ..Self::default() }
     }
 }
 
