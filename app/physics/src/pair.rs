@@ -369,7 +369,8 @@ impl Pair {
             worked_j += row.torque_W().dot(&spin_W(row, end.motions)) * end.dt_s;
         }
         self.ledger.enter(worked_j);
-        if self.memory.patches.spread.is_crowded() {
+        // Of pairs without a mesh that is whatever was there.
+        if self.has_mesh && self.memory.patches.spread.is_crowded() {
             let squares = self.anchors[..self.rows].iter().map(|anchor| anchor.worked.iter().sum::<f64>());
             self.ledger.lose_beyond(0.5 * stiffness_n_per_m * squares.sum::<f64>());
         }
