@@ -59,8 +59,10 @@ fn live(driver: &mut Driver) {
     be_refused(driver);
     let status = io_driver(&["status", "--json"], driver.socket());
     assert_eq!(status.status, Some(0), "{status:?}");
-    assert_eq!(io_driver(&["emergency-stop"], driver.socket()).status, Some(0));
-    assert_eq!(io_driver(&["clear-fault"], driver.socket()).status, Some(0));
+    for asked in ["emergency-stop", "clear-fault"] {
+        let said = io_driver(&[asked], driver.socket());
+        assert_eq!(said.status, Some(0), "{asked}: {said:?}");
+    }
     // While it is stopped its waits are interrupted, and go on.
     send(driver.child.id(), Signal::STOP);
     send(driver.child.id(), Signal::CONT);
