@@ -52,7 +52,7 @@ pub struct FastLoop {
     step: FastStep,
     /// More room for its contacts, when it needs that.
     supply: RoomSupply,
-    /// How much of what moves a tick has time for, if it has not as much as it likes.
+    /// Pace of what moves, if ticks have not as much time as they like.
     pace: Option<Pace>,
     /// What people change meanwhile, if anybody may.
     control: Option<Control>,

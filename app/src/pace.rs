@@ -1,4 +1,4 @@
-//! How many of the things that move a tick has time for, by how long ticks take.
+//! Number of the things that move for which a tick has time, by how long ticks take.
 //!
 //! Problem: what a heap costs hangs on its shapes, on how it lies and on the machine. A finger in one that takes longer than a
 //! tick gets no answers.

@@ -31,7 +31,7 @@ impl<'e, T: Clone> PerShape<'e, T> {
         answer
     }
 
-    /// How many shapes an answer was remembered of.
+    /// Number of shapes of which an answer was remembered.
     #[cfg(test)]
     pub(crate) fn count(&self) -> usize {
         self.0.len()

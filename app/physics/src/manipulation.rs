@@ -94,7 +94,7 @@ pub struct Manipulation {
     neighbours: Vec<u32>,
     /// Entities that somebody moves.
     driven: Vec<Driven>,
-    /// Who is stepped, where not all can be.
+    /// Turns of those that are stepped, where not all can be.
     turns: Turns,
     /// Whether bodies that somebody else steps are not there.
     ignores_elsewhere: bool,

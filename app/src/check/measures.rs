@@ -41,7 +41,7 @@ pub(super) struct Measures {
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Undrawn {
     pub(super) remainder: Remainder,
-    /// What is thinner may not be drawn (m).
+    /// Thickness below which it may not be drawn (m).
     pub(super) least_drawn_m: f64,
 }
 
@@ -128,7 +128,7 @@ impl std::fmt::Display for Measures {
     }
 }
 
-/// What was measured so far.
+/// Measures so far.
 #[derive(Debug, Default)]
 struct Measured<'e> {
     /// The boxes around what runs, in its own frame (m); `None`: it has no end.

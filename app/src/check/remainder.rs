@@ -1,4 +1,4 @@
-//! Whether anything is left of a solid joined of others.
+//! Remainder of a solid joined of others: whether there is any.
 //!
 //! Problem: a drawing leaves out what is thinner than a cell of its grid, so that an empty one does not say that nothing is felt.
 //! Model: no place within `r` of one is inside if the distance there is more than `r`, since the distance that a solid tells is
@@ -11,7 +11,7 @@
 use haptics::Csg;
 use nalgebra::Vector3;
 
-/// What is known of a solid without triangles.
+/// Knowledge of a solid without triangles.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Remainder {
     /// There is no place in it.
@@ -65,7 +65,7 @@ fn is_something(csg: &Csg) -> bool {
     (0..LATTICE.pow(3)).any(|k| leads_inside(csg, place(k)))
 }
 
-/// Whether the way to the boundary, and a little further, ends inside.
+/// True if the way to the boundary, and a little further, ends inside.
 fn leads_inside(csg: &Csg, mut place_B: Vector3<f64>) -> bool {
     let further_m = FURTHER * csg.extent_m();
     for _ in 0..STEPS {

@@ -95,7 +95,7 @@ fn too_stiff(rig: &Rig, stands: &mut Stands) -> Vec<String> {
     told.collect()
 }
 
-/// What two fingers hold swings between them, and falls by e in `m / b`; more damping than the loop stands is no remedy.
+/// Things that two fingers hold swing between them, and less by e in `m / b`; more damping than the loop stands is no remedy.
 fn sways(rig: &Rig, entities: &[Entity]) -> Option<String> {
     let limit = rig.limits(Limits::DEFAULT_DEVICE_MASS_KG).ok()?.damping_n_s_per_m();
     let long = |(index, mass_kg): (usize, f64)| {
@@ -249,7 +249,7 @@ fn unseen(whole: &Scene) -> Vec<String> {
     unread.into_iter().chain(plain).collect()
 }
 
-/// What swings for longer than that between fingers is told \[s\], and what it may be instead.
+/// Time from which on swinging between fingers is told \[s\], and a good one.
 const MOST_SWAYING_S: f64 = 5.0;
 const SWAYING_S: f64 = 2.0;
 /// Doors are tried from so far to so far (m).

@@ -64,7 +64,7 @@ pub struct Means {
     pub slow_lists: Option<Sender<SlowList>>,
     /// Whether what runs is shown to anybody.
     pub is_shown: bool,
-    /// Whether recordings show the scene.
+    /// True if recordings show the scene.
     pub is_recorded_as_seen: bool,
 }
 

@@ -354,7 +354,7 @@ impl Objects {
         }
     }
 
-    /// What has not been handed over yet stands still, and is no wall: a finger feels so much of it, and goes through.
+    /// Things that have not been handed over yet stand still, and are no walls: a finger feels so much of them, and goes through.
     fn give_way(&mut self) {
         self.gave_way = 0;
         let Some(lists) = &self.lists else { return };

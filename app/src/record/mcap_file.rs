@@ -48,7 +48,7 @@ const CHUNK_NS: u64 = 500_000_000;
 const CHUNK_BYTES: usize = 4 << 20;
 /// More than this no chunk has: readers of ours take twice as much.
 pub(super) const MOST_CHUNK_BYTES: usize = 32 << 20;
-/// What a message has besides its content, at most.
+/// Most bytes of a message besides its content.
 const MESSAGE_HEAD_BYTES: usize = 32;
 /// Between two pictures (ns).
 const PICTURE_NS: u64 = 20_000_000;
@@ -168,7 +168,7 @@ impl McapFile {
         Ok(file)
     }
 
-    /// What is seen of the scene; nothing of it goes out yet into what may wait for a reader.
+    /// Picture of the scene; nothing of it goes out yet into what may wait for a reader.
     fn put_scene(&mut self, begins: u64, may_wait: bool) -> Result<(), McapError> {
         let scene = std::mem::take(&mut self.view.scene);
         self.beginning.is_held.store(may_wait, Ordering::Relaxed);

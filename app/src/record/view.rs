@@ -101,7 +101,7 @@ impl View {
     }
 }
 
-/// Whether one of these recordings has a picture of the scene.
+/// True if one of these recordings has a picture of the scene.
 pub fn shows_scene(files: &[PathBuf]) -> bool {
     files.iter().any(|file| RunFormat::of(file).is_ok_and(|format| format == RunFormat::Mcap))
 }

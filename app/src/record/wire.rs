@@ -28,7 +28,7 @@ impl Message {
         &self.bytes
     }
 
-    /// What is written.
+    /// Bytes that are written.
     pub(super) fn into_bytes(self) -> Vec<u8> {
         self.bytes
     }

@@ -31,7 +31,7 @@ pub(crate) fn triangles(csg: &Csg) -> Triangles {
     Grid::over(csg).contour()
 }
 
-/// What is thinner may not be drawn (m).
+/// Thickness below which it may not be drawn (m).
 pub(crate) fn least_drawn_m(csg: &Csg) -> f64 {
     2.0 * REACH * csg.extent_m() / CELLS as f64
 }

@@ -6,8 +6,8 @@
 //! point. More are grouped, each with the nearest of so many that were chosen far from each other: a group presses at the
 //! middle of its load, as deep and as hard as has the force and the energy of all of it. So both, and the torque, are those
 //! of all vertices, whoever was chosen.
-//! Where more than [`MOST_VERTICES`] are within reach, only every second one counts, or every fourth, and so on: of each its
-//! number says whether it does, wherever the mesh stands.
+//! Of more than [`MOST_VERTICES`] within reach only every second one counts, or every fourth, and so on: of each its number
+//! says whether it does, wherever the mesh stands.
 //! Identity: a chosen one stays chosen while it is within reach; how many count changes only where they are too many or few.
 //! Cost: a query, and a distance for each vertex and chosen one: up to some tens of microseconds. Where there are more than it has
 //! room for, they are looked at again after a while.
@@ -19,12 +19,12 @@ use super::mesh::{About, Contact};
 use super::mesh_corner::Corner;
 use super::mesh_span::Standing;
 
-/// What is remembered from tick to tick.
+/// Memory from tick to tick.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub(crate) struct Spread {
     /// Vertices that were chosen, plus one; 0: none.
     chosen: [u32; MAX_POINTS],
-    /// How often every second one was left out.
+    /// Number of times that every second one was left out.
     halvings: u32,
     /// A few stand for all, for there are too many.
     is_crowded: bool,
@@ -33,7 +33,7 @@ pub(crate) struct Spread {
 }
 
 impl Spread {
-    /// Whether a few vertices stand for many that press softly.
+    /// True if a few vertices stand for many that press softly.
     pub(crate) fn is_crowded(&self) -> bool {
         self.is_crowded
     }
@@ -45,7 +45,7 @@ struct Low {
     number: u32,
     at_M: Vector3<f64>,
     gap_m: f64,
-    /// Which of those that were chosen is nearest, and how far that is, squared \[m^2\].
+    /// Nearest of those that were chosen, and the distance to it, squared \[m^2\].
     group: usize,
     apart_m2: f64,
 }
@@ -99,7 +99,7 @@ pub(super) fn tell(
     true
 }
 
-/// Which vertices were seen, plus one, each at the first free place from that of its number on.
+/// Vertices that were seen, plus one, each at the first free place from that of its number on.
 struct Seen {
     names: [u32; SEEN],
 }
@@ -205,9 +205,9 @@ impl Lows {
 
 /// The most within reach of which all count.
 pub(super) const MOST_VERTICES: usize = 256;
-/// Where there were too many they are for so many ticks.
+/// Ticks for which there are too many, once there were.
 const WAITS: u32 = 31;
-/// Where fewer count of those that could, twice as many do.
+/// Number below which twice as many count, if there are.
 const FEW_VERTICES: usize = 96;
 /// A sixteenth is left then.
 const MOST_HALVINGS: u32 = 4;

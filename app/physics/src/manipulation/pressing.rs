@@ -12,7 +12,7 @@ impl Manipulation {
         self.pairs.iter_awake().map(|(_, pair)| (pair.entities, pair.force_W(&self.room.rows)))
     }
 
-    /// Whether nobody steps these two at the time because at least one of them sleeps, or waits for its turn: what they did to
+    /// True if nobody steps these two at the time because at least one of them sleeps, or waits for its turn: what they did to
     /// each other, they still do.
     pub fn rest_together(&self, entities: [usize; 2]) -> bool {
         let mut standings =

@@ -19,7 +19,7 @@ use crate::collide::bounding_ball;
 use crate::roster::{Roster, Standing};
 use crate::touch::Touch;
 
-/// Who is stepped and who waits.
+/// Bodies that are stepped, and those that wait.
 #[derive(Debug, Clone)]
 pub(super) struct Turns {
     /// The most bodies in a tick.
@@ -63,7 +63,7 @@ impl Turns {
         self.change_at = 0;
     }
 
-    /// Whether so many are as many as may be stepped.
+    /// True if so many are as many as may be stepped.
     pub(super) fn are_enough(&self, awake: usize) -> bool {
         awake >= self.most
     }
@@ -79,7 +79,7 @@ impl Manipulation {
         self.turns.near.extend(near_W.filter(are_numbers).take(MOST_NEAR));
     }
 
-    /// How many wait for their turn.
+    /// Number of bodies that wait for their turn.
     pub fn held(&self) -> usize {
         self.turns.held.iter().filter(|body| self.roster.standing(**body as usize) == Standing::Held).count()
     }
@@ -177,5 +177,5 @@ impl Manipulation {
 const TURN: u64 = 16;
 /// Places of fingers and of what they hold.
 const MOST_NEAR: usize = 16;
-/// Who is stepped counts as so much nearer: two that are as near do not take turns \[m\].
+/// Advantage of those that are stepped: two that are as near do not take turns \[m\].
 const STAYS_M: f64 = 2e-3;

@@ -59,7 +59,7 @@ impl Surfacing {
         if self.is_as_felt() { f64::INFINITY } else { DEEPEST_REST_M }
     }
 
-    /// Whether points are as soft as fingers feel both.
+    /// True if points are as soft as fingers feel both.
     pub(crate) fn is_as_felt(&self) -> bool {
         !self.damping.is_ratio()
     }

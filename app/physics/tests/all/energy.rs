@@ -137,7 +137,7 @@ fn energy_never_grows_where_springs_answer() {
     throw_all(15, 1500);
 }
 
-/// Who waits is fixed meanwhile, and goes on as it was: near a place that moves, or all in turns.
+/// Bodies that wait are fixed meanwhile, and go on as they were: near a place that moves, or all in turns.
 #[test]
 fn energy_never_grows_where_not_all_are_stepped_in_a_tick() {
     let (kinds, response) = (&KINDS[..], Response::Force);

@@ -1,4 +1,4 @@
-//! Who is stepped where a tick has no time for all that moves.
+//! Turns of bodies, where a tick has no time for all that moves.
 #![allow(non_snake_case)]
 
 use crate::{common, counting};
