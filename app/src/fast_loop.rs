@@ -379,7 +379,7 @@ impl FastLoop {
         self.tally.held_ticks += u64::from(held > 0);
         self.tally.stepped_then += if held > 0 { awake as u64 } else { 0 };
         self.tally.most_held = self.tally.most_held.max(held);
-        self.tally.gave_way += u64::from(self.step.gave_way() > 0);
+        self.tally.gave_way += u64::from(self.step.gives_way().contains(&true));
         for cut in self.step.cuts() {
             self.tally.cuts += 1;
             self.tally.most_cut_n = self.tally.most_cut_n.max(cut.force_n);

@@ -231,9 +231,10 @@ impl FastStep {
         })
     }
 
-    /// Touches that were felt with less in the last tick, since what they touch had not been handed over.
-    pub fn gave_way(&self) -> usize {
-        self.objects.gave_way
+    /// Of each finger, whether it felt less in the last tick than it pressed with, since what stopped it had not been handed over,
+    /// or waited for its turn.
+    pub fn gives_way(&self) -> &[bool] {
+        &self.objects.gives_way
     }
 
     /// From now on no more of what moves than this is stepped in a tick here ([`Manipulation::step_at_most`]).

@@ -131,7 +131,7 @@ impl fmt::Display for Report {
             let ticks = tally.gave_way;
             writeln!(
                 f,
-                "gave way     {ticks} ticks in which fingers felt less of things that had not been handed over to them yet"
+                "gave way     {ticks} ticks in which fingers felt less of things that had not been handed over to them yet, or waited for their turn"
             )?;
         }
         if tally.crowded > 0 {

@@ -1,11 +1,14 @@
 //! The thread of the slow list: steps what no finger is near, at its own rate.
 //!
 //! Model: some hundred times a second it looks how many ticks the run has made, and goes on by as many, in steps of a tick.
-//! If that takes longer than it should, what is in the slow list goes slower than the rest, and how much is counted.
+//! If that takes longer than it should, what is in the slow list goes slower than the rest, and how much is counted: a turn ends
+//! in time, and a tick steps no more bodies than it has time for ([`Pace`]), all in turns. For who asks for a body waits for the
+//! end of a tick.
 //! It has no real-time rights; nobody waits for it. Where orders bring other worlds, it has their lists, too, and steps those
 //! of worlds that run.
 //! Invariant: it ends with its owner, whatever ended that.
 
+use crate::pace::Pace;
 use rt_core::clock::{monotonic_ns, sleep_until_ns};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
@@ -17,6 +20,8 @@ use world::lists::SlowList;
 const TURN_NS: u64 = 10_000_000;
 /// A turn makes up for no more ticks.
 const MOST_TICKS: u64 = 40;
+/// A tick that steps all bodies takes no more than a third of this (ns).
+const PACE_NS: u64 = 9_000_000;
 
 /// The running thread.
 pub struct SlowThread {
@@ -53,7 +58,8 @@ impl SlowThread {
     ) -> std::io::Result<Self> {
         let stop = Arc::new(AtomicBool::new(false));
         let stopped = Arc::clone(&stop);
-        let lists = SlowLists { lists: first.into_iter().collect(), later };
+        let pace = Pace::new(PACE_NS);
+        let lists = SlowLists { lists: first.into_iter().collect(), later, pace };
         let thread = std::thread::Builder::new()
             .name("slow-list".into())
             .spawn(move || go_on(lists, &run_ticks, period_ns, &stopped))?;
@@ -80,13 +86,26 @@ impl Drop for SlowThread {
 struct SlowLists {
     lists: Vec<SlowList>,
     later: Receiver<SlowList>,
+    pace: Pace,
 }
 
 impl SlowLists {
-    fn turn(&mut self, ticks: u32, dt_s: f64) {
+    /// Says how many of the ticks were made whole, in the list where these are fewest.
+    fn turn(&mut self, ticks: u32, dt_s: f64) -> u32 {
         self.lists.extend(self.later.try_iter());
         self.lists.retain(|slow| !slow.is_over());
-        self.lists.iter_mut().for_each(|slow| slow.turn(ticks, dt_s));
+        let (pace, begin_ns) = (&mut self.pace, monotonic_ns());
+        let whole = self.lists.iter_mut().map(|slow| {
+            let mut seen_ns = monotonic_ns();
+            slow.turn_while(ticks, dt_s, |manipulation, made| {
+                let now_ns = monotonic_ns();
+                let took_ns = now_ns - std::mem::replace(&mut seen_ns, now_ns);
+                made.iter().for_each(|made| pace.take(took_ns, made.awake, made.held > 0));
+                manipulation.step_at_most(pace.bodies(), std::iter::empty());
+                now_ns - begin_ns < TURN_NS
+            })
+        });
+        whole.min().unwrap_or(ticks)
     }
 
     /// That of the world which runs.
@@ -107,8 +126,8 @@ fn go_on(
         // While a driver that was restarted begins again, the count is 0 for a moment.
         let now = run_ticks.load(Ordering::Relaxed).max(seen);
         let passed = now - std::mem::replace(&mut seen, now);
-        late_ticks += passed.saturating_sub(MOST_TICKS);
-        lists.turn(passed.min(MOST_TICKS) as u32, dt_s);
+        let whole = lists.turn(passed.min(MOST_TICKS) as u32, dt_s);
+        late_ticks += passed - u64::from(whole);
         due_ns = (due_ns + TURN_NS).max(monotonic_ns());
         sleep_until_ns(due_ns);
     }

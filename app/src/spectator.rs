@@ -197,6 +197,7 @@ impl Spectator {
             touching: so_far.pairs().collect(),
             recording: recording.map(|path| path.display().to_string()),
             is_paused: so_far.is_paused,
+            is_overloaded: so_far.is_overloaded,
         }
     }
 

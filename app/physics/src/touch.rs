@@ -33,6 +33,9 @@ pub struct Touch {
     pub stiffness_n_per_m: f64,
     /// Of the face that is touched ([`Entity::felt_material`]).
     pub label: u16,
+    /// Answer of [`Manipulation::step`](crate::Manipulation::step): the body, or what it pushes, was stopped in the tick by bodies
+    /// that are fixed only until they are stepped: their turn has not come, or they are on their way from elsewhere.
+    pub leans_on_waiting: bool,
 }
 
 impl Touch {
@@ -47,6 +50,7 @@ impl Touch {
             is_sticking: ContactState::from(contact.friction) == ContactState::Stick,
             stiffness_n_per_m: contact.stiffness_n_per_m,
             label: contact.label,
+            leans_on_waiting: false,
         }
     }
 

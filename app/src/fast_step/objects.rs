@@ -27,9 +27,13 @@ use crate::slow_thread::SlowRemains;
 const SLOW_EVERY: u32 = 10;
 /// A finger touches no more bodies at once.
 const MOST_TOUCHED: usize = 16;
-/// The most that is felt of what has not been handed over \[N\], and from where on its contact is given up: some centimetres deep.
+/// The most that is felt of what has not been handed over \[N\], and of what leans on bodies that wait.
 const MOST_UNTIL_IT_COMES_N: f64 = 3.0;
+const MOST_LEANING_N: f64 = 10.0;
+/// From where on such a contact is given up \[N\]: some centimetres deep.
 const GIVEN_UP_N: f64 = 20.0;
+/// Ticks for which a finger leans on after it did: bodies that were squeezed come back.
+const LEANS_ON: u32 = 64;
 const MOST_GIVEN_UP: usize = 64;
 /// Ticks that a single step of the objects makes up for at most.
 const MOST_TICKS: f64 = 4.0;
@@ -75,8 +79,10 @@ pub struct Objects {
     pub(super) moved: Moved,
     /// Contacts with what has not been handed over that are given up: fingers and entities.
     given_up: Vec<(usize, usize)>,
-    /// Touches that gave way in the last tick, since what they touch had not been handed over.
-    pub(super) gave_way: usize,
+    /// Of each finger, for how many ticks it is still taken for one that presses bodies into others that wait.
+    leaning: Vec<u32>,
+    /// Of each finger, whether it felt less in the last tick, since what it presses had not been handed over, or waited.
+    pub(super) gives_way: Vec<bool>,
     /// The most bodies that a tick steps.
     pub(super) most_stepped: usize,
     /// What the last tick took.
@@ -126,7 +132,8 @@ impl Objects {
             is_paused: false,
             moved: Moved::default(),
             given_up: Vec::with_capacity(room.min(MOST_GIVEN_UP)),
-            gave_way: 0,
+            leaning: vec![0; fingers.len()],
+            gives_way: vec![false; fingers.len()],
             most_stepped: usize::MAX,
             made: Made::default(),
             stepped_s: 0.0,
@@ -354,25 +361,63 @@ impl Objects {
         }
     }
 
-    /// Things that have not been handed over yet stand still, and are no walls: a finger feels so much of them, and goes through.
+    /// Bodies that stand still only until they are stepped are no walls: a finger that presses them, or others into them, feels so
+    /// much, and goes through. They have not been handed over yet, or wait for their turn.
     fn give_way(&mut self) {
-        self.gave_way = 0;
-        let Some(lists) = &self.lists else { return };
-        for touch in &mut self.touches {
-            let is_on_its_way =
-                |body: &usize| self.manipulation.standing(*body).is_away() && !lists.hand_over.holds(*body);
-            let pressed_n = touch.force_on_user_W.norm();
-            if pressed_n > MOST_UNTIL_IT_COMES_N
-                && self.manipulation.body_of(touch.entity).filter(is_on_its_way).is_some()
-            {
-                touch.force_on_user_W *= MOST_UNTIL_IT_COMES_N / pressed_n;
-                self.gave_way += 1;
-                // What comes later must not find a spring of any length.
-                if pressed_n > GIVEN_UP_N && self.given_up.len() < self.given_up.capacity() {
-                    self.given_up.push((touch.finger, touch.entity));
-                }
+        for finger in 0..self.leaning.len() {
+            let leans = self.touches.iter().any(|touch| touch.finger == finger && touch.leans_on_waiting);
+            self.leaning[finger] = if leans { LEANS_ON } else { self.leaning[finger].saturating_sub(1) };
+            self.gives_way[finger] = self.give_way_to(finger);
+        }
+    }
+
+    /// Says whether anything did.
+    fn give_way_to(&mut self, finger: usize) -> bool {
+        let mut gave_way = false;
+        let lies_on_nothing = |touch: &Touch| self.is_on_its_way(touch.entity);
+        let leaning_n = self.touches.iter().filter(|touch| touch.finger == finger && !lies_on_nothing(touch));
+        let leaning_n = leaning_n.map(|touch| touch.force_on_user_W.norm()).sum();
+        for at in 0..self.touches.len() {
+            let touch = self.touches[at];
+            if touch.finger != finger {
+                continue;
+            }
+            let touch_n = touch.force_on_user_W.norm();
+            let is_on_its_way = self.is_on_its_way(touch.entity);
+            let (pressed_n, felt_n) = if is_on_its_way {
+                (touch_n, touch_n.min(MOST_UNTIL_IT_COMES_N))
+            } else if self.leaning[finger] > 0 {
+                (leaning_n, felt_of_leaning_n(leaning_n))
+            } else {
+                continue;
+            };
+            if felt_n >= pressed_n {
+                continue;
+            }
+            gave_way = true;
+            let force_on_user_W = touch.force_on_user_W * (felt_n / pressed_n);
+            if !is_on_its_way && self.owed.len() < self.owed.capacity() {
+                let Touch { entity, finger, point_W, .. } = touch;
+                let changed_W = force_on_user_W - touch.force_on_user_W;
+                let back =
+                    Pull { entity, finger, point_W, force_on_user_W: changed_W, stiffness_n_per_m: 0.0 };
+                self.owed.push(back);
+            }
+            self.touches[at].force_on_user_W = force_on_user_W;
+            // What comes later must not find a spring of any length.
+            if pressed_n > GIVEN_UP_N && self.given_up.len() < self.given_up.capacity() {
+                self.given_up.push((touch.finger, touch.entity));
             }
         }
+        gave_way
+    }
+
+    /// Whether an entity is a body that has not been handed over yet, and is not an order's.
+    fn is_on_its_way(&self, entity: usize) -> bool {
+        let (Some(lists), Some(body)) = (&self.lists, self.manipulation.body_of(entity)) else {
+            return false;
+        };
+        self.manipulation.standing(body).is_away() && !lists.hand_over.holds(body)
     }
 
     /// The contacts, by finger and entity, that end with this tick.
@@ -527,6 +572,12 @@ impl Objects {
         }
         self.felt_pulls = self.pulls.len();
     }
+}
+
+/// What of a force is felt where bodies lean on others that wait (N): it fades, the harder they are pressed.
+fn felt_of_leaning_n(pressed_n: f64) -> f64 {
+    let left = (GIVEN_UP_N - pressed_n) / (GIVEN_UP_N - MOST_LEANING_N);
+    pressed_n.min(MOST_LEANING_N * left.max(0.0))
 }
 
 fn orientation([w, x, y, z]: [f64; 4]) -> UnitQuaternion<f64> {

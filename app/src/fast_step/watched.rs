@@ -6,7 +6,7 @@
 use super::{Cut, FastStep};
 use crate::row::Row;
 use haptics::ContactState;
-use world::events::{EventSender, FastPairs, Kind, List, PairForce, Touching, Watch};
+use world::events::{Change, EventSender, FastPairs, Kind, List, PairForce, Touching, Watch};
 use world::lists::Handed;
 
 /// Pairs of entities that are watched at once.
@@ -15,14 +15,18 @@ const MOST_PAIRS: usize = 2048;
 /// More bodies than an island has that is given away in a tick.
 const MOST_GONE: usize = 64;
 
-/// A crowd that is left for less goes on (s).
-const CROWD_S: f64 = 0.1;
+/// A crowd that is left for less goes on (s), and so does an overload, and what gives way.
+const GOES_ON_S: f64 = 0.1;
 
 /// Tells, after each step of a world, what is new.
 pub struct EventTeller {
     watch: Watch,
     /// Of each finger, how long it is still said to be in a crowd (s).
     crowded_s: Vec<f64>,
+    /// Likewise, that what it presses gives way (s).
+    gives_way_s: Vec<f64>,
+    /// For how long an overload goes on, and the most bodies that waited in it; `None`: there is none.
+    overload: Option<(f64, u32)>,
     /// What the slow list tells of its pairs, if there is one.
     slow: Option<FastPairs>,
     touching: Vec<Touching>,
@@ -45,6 +49,8 @@ impl EventTeller {
         Self {
             watch: Watch::new(step.fingers.len(), most_touched, pairs, step.period_s),
             crowded_s: vec![0.0; step.fingers.len()],
+            gives_way_s: vec![0.0; step.fingers.len()],
+            overload: None,
             slow,
             touching: Vec::with_capacity(most_touched),
             elsewhere: (0..bodies).map(|body| step.objects.is_slow(body)).collect(),
@@ -65,6 +71,7 @@ impl EventTeller {
             self.watch.tell(Kind::Cut { finger: finger as u32, entity, force_n }, out);
         }
         self.tell_crowds(step, out);
+        self.tell_overload(step, out);
         self.watch.grasps(out);
         self.tell_doors(step, out);
         self.tell_lists(step, out);
@@ -79,6 +86,7 @@ impl EventTeller {
     pub fn end(&mut self, next: &mut Self, run_tick: u64, why: Kind, out: &mut EventSender) {
         self.watch.begin(run_tick);
         self.watch.end(&mut next.watch, out);
+        self.end_overload(out);
         self.watch.tell(why, out);
     }
 
@@ -98,14 +106,38 @@ impl EventTeller {
 
     fn tell_crowds(&mut self, step: &FastStep, out: &mut EventSender) {
         for ((finger, near), left_s) in (0..).zip(&step.near).zip(&mut self.crowded_s) {
-            if !near.is_crowded() {
-                *left_s -= step.period_s;
-                continue;
-            }
-            if *left_s <= 0.0 {
+            if begins(near.is_crowded(), left_s, step.period_s) {
                 self.watch.tell(Kind::Crowded { finger }, out);
             }
-            *left_s = CROWD_S;
+        }
+        for ((finger, gives_way), left_s) in (0..).zip(step.gives_way()).zip(&mut self.gives_way_s) {
+            if begins(*gives_way, left_s, step.period_s) {
+                self.watch.tell(Kind::GaveWay { finger }, out);
+            }
+        }
+    }
+
+    fn tell_overload(&mut self, step: &FastStep, out: &mut EventSender) {
+        let waiting = u32::try_from(step.made().held).unwrap_or(u32::MAX);
+        match &mut self.overload {
+            None if waiting > 0 => {
+                self.overload = Some((GOES_ON_S, waiting));
+                self.watch.tell(Kind::Overload { change: Change::Begins, waiting }, out);
+            }
+            None => {}
+            Some((left_s, most)) => {
+                *left_s = if waiting > 0 { GOES_ON_S } else { *left_s - step.period_s };
+                *most = waiting.max(*most);
+                if *left_s <= 0.0 {
+                    self.end_overload(out);
+                }
+            }
+        }
+    }
+
+    fn end_overload(&mut self, out: &mut EventSender) {
+        if let Some((_, waiting)) = self.overload.take() {
+            self.watch.tell(Kind::Overload { change: Change::Ends, waiting }, out);
         }
     }
 
@@ -159,4 +191,11 @@ impl EventTeller {
             }
         }
     }
+}
+
+/// Whether something begins that `is` so in this tick and goes on for a while (s) when it is not any more.
+fn begins(is: bool, left_s: &mut f64, period_s: f64) -> bool {
+    let begins = is && *left_s <= 0.0;
+    *left_s = if is { GOES_ON_S } else { *left_s - period_s };
+    begins
 }

@@ -27,6 +27,8 @@ pub(super) struct SoFar {
     pairs: BTreeSet<[usize; 2]>,
     /// Whether nothing moves by itself.
     pub(super) is_paused: bool,
+    /// Whether bodies wait for their turn.
+    pub(super) is_overloaded: bool,
     /// Orders that were taken, by their numbers, in the order in which they were.
     orders: Vec<u64>,
 }
@@ -34,7 +36,7 @@ pub(super) struct SoFar {
 impl Happened {
     /// From now on listens here; orders are in this book.
     pub(super) fn new(hub: &mut Hub, book: Book) -> Self {
-        let filter = Filter::of(&[Class::Contact, Class::Pair, Class::Reset, Class::Order]);
+        let filter = Filter::of(&[Class::Contact, Class::Pair, Class::Overload, Class::Reset, Class::Order]);
         Self { events: hub.subscribe_queue(filter, PLACES), book, so_far: SoFar::default() }
     }
 
@@ -78,6 +80,7 @@ impl SoFar {
                     _ => self.pairs.insert(pair),
                 };
             }
+            Kind::Overload { change, .. } => self.is_overloaded = change != Change::Ends,
             Kind::Order { number } => {
                 self.orders.push(number);
                 if let Ok(Some(Words::Pause(is_paused))) = words::parse(&words_of(number)) {
@@ -91,6 +94,7 @@ impl SoFar {
             Kind::Reset | Kind::Lost { .. } => {
                 self.fingers.clear();
                 self.pairs.clear();
+                self.is_overloaded = false;
             }
             _ => {}
         }
@@ -168,6 +172,15 @@ mod tests {
         ]);
         assert_eq!((so_far.felt(0, None), pairs(&so_far)), (vec![], vec![[1, 3]]));
         assert!(so_far.is_paused);
+    }
+
+    #[test]
+    fn things_wait_for_their_turn_until_all_fit_into_a_tick_again_or_the_world_is_another() {
+        let overload = |change| Kind::Overload { change, waiting: 3 };
+        assert!(told(&[overload(Change::Begins)]).is_overloaded);
+        for end in [overload(Change::Ends), Kind::Reset, Kind::Scene { number: 1 }] {
+            assert!(!told(&[overload(Change::Begins), end]).is_overloaded, "{end:?}");
+        }
     }
 
     #[test]

@@ -2,7 +2,7 @@
 
 use bytemuck::Zeroable;
 use nalgebra::Vector3;
-use phantom3::fast_step::FastStep;
+use phantom3::fast_step::{EventTeller, FastStep};
 use phantom3::lists_end::ListsEnd;
 use phantom3::rig::{HandMode, Rig};
 use phantom3::row::{FingerRow, Row};
@@ -14,6 +14,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Duration;
 use world::Scene;
+use world::events::{Change, Kind, event_queue};
 use world::lists::SlowList;
 
 const DT: f64 = 1e-3;
@@ -107,7 +108,7 @@ fn what_nobody_hands_over_is_no_wall_and_is_not_flung_when_it_comes() {
             let felt = run.tick([along(tick), 0.03, 0.0], false);
             most_n = most_n.max(felt.force_on_user.norm());
             touched += u64::from(felt.entity.is_some());
-            gave_way += u64::from(run.step.gave_way() > 0);
+            gave_way += u64::from(run.step.gives_way()[0]);
         }
         assert!((2.9..=3.0 + 1e-12).contains(&most_n), "{speed_m_s} m/s: {most_n}");
         assert!(gave_way > 0 && touched > gave_way && run.here() == 0, "{touched} {gave_way}");
@@ -123,6 +124,57 @@ fn what_nobody_hands_over_is_no_wall_and_is_not_flung_when_it_comes() {
         assert!(run.step.handed().expect("two lists").1.came > 0);
         // As fast as a spring of 30 mm throws it, 70 rad/s.
         assert!(fastest_m_s < 0.03 * (500.0_f64 / MASS).sqrt(), "{speed_m_s} m/s: {fastest_m_s}");
+    }
+}
+
+/// A finger at 1.5 m/s through a row of cubes of which a tick steps no more than these: the largest force (N), the ticks in which
+/// something gave way, and what is told of it.
+fn through_a_row(most: usize) -> (f64, u64, Vec<Kind>) {
+    let row = cube("mass_kg = 0.1\ngrid = { count = [30, 1, 1], spacing_m = [0.1, 1, 1] }");
+    let mut run = Run::new(&format!("{STANDING}{row}"));
+    let mut teller = EventTeller::new(&mut run.step);
+    let (mut sender, mut told) = event_queue(8192);
+    let (mut most_n, mut gave_way) = (0.0_f64, 0);
+    for tick in 0..2100 {
+        run.step.step_at_most(most);
+        let felt = run.tick([-0.1 + 1.5e-3 * tick as f64, 0.02, 0.0], false);
+        most_n = most_n.max(felt.force_on_user.norm());
+        gave_way += u64::from(run.step.gives_way()[0]);
+        let row = Row { run_tick: tick, ..Row::empty() };
+        teller.tell(&run.step, &row, &mut sender);
+    }
+    // All are stepped again.
+    run.step.step_at_most(usize::MAX);
+    for tick in 2100..2250 {
+        run.tick([3.05, 0.02, 0.0], false);
+        teller.tell(&run.step, &Row { run_tick: tick, ..Row::empty() }, &mut sender);
+    }
+    let told = std::iter::from_fn(|| told.receive(u64::MAX)).map(|event| event.kind);
+    let about = |kind: &Kind| matches!(kind, Kind::GaveWay { .. } | Kind::Overload { .. });
+    (most_n, gave_way, told.filter(about).collect())
+}
+
+#[test]
+fn a_row_that_a_finger_pushes_into_what_waits_for_its_turn_is_no_wall() {
+    // Thirty that slide, and those that are struck: 0.3 m g each is 8.8 N.
+    let (all_n, gave_way, told) = through_a_row(usize::MAX);
+    assert!((9.0..20.0).contains(&all_n) && gave_way == 0 && told.is_empty(), "{all_n} {gave_way} {told:?}");
+    for most in [4, 8, 16] {
+        let (felt_n, gave_way, told) = through_a_row(most);
+        assert!(felt_n < 2.0 * all_n && gave_way > 0, "{most}: {felt_n} N, {gave_way}");
+        let yields = told.iter().filter(|kind| matches!(kind, Kind::GaveWay { finger: 0 })).count();
+        assert!((1..=22).contains(&yields), "once in a tenth of a second: {yields}");
+        let changes: Vec<_> = told
+            .iter()
+            .filter_map(|kind| {
+                if let Kind::Overload { change, waiting } = kind { Some((change, waiting)) } else { None }
+            })
+            .collect();
+        assert!(!changes.is_empty(), "{told:?}");
+        for pair in changes.chunks(2) {
+            let [(Change::Begins, first), (Change::Ends, at_most)] = pair else { panic!("{changes:?}") };
+            assert!(**first > 0 && first <= at_most, "{changes:?}");
+        }
     }
 }
 

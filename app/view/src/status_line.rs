@@ -5,7 +5,7 @@ use crate::news::Status;
 use std::fmt::Write;
 
 /// Rate, ticks that the driver skipped, replies that were late, latency, sizes of both lists, the force at each finger,
-/// whether it stands still or is recorded. What nobody told yet is left out.
+/// whether it stands still, is more than a tick has time for, or is recorded. What nobody told yet is left out.
 pub fn status_line(status: &Status, moment: &Moment) -> String {
     let mut line = format!("{:7.2} s", moment.t_s);
     // A string takes everything.
@@ -27,6 +27,9 @@ pub fn status_line(status: &Status, moment: &Moment) -> String {
     }
     if status.is_paused {
         line.push_str(" | PAUSED");
+    }
+    if status.is_overloaded {
+        line.push_str(" | IN TURNS");
     }
     if let Some(file) = &status.recording {
         let _ = write!(line, " | RECORDING {file}");
@@ -56,9 +59,10 @@ mod tests {
             lists: [3, 17],
             recording: Some("a.mcap".into()),
             is_paused: true,
+            is_overloaded: true,
             ..status
         };
-        let all = "  12.35 s | 1000 Hz, 2 skipped, 5 late | reply 45/80/121 us | fast 3, slow 17 | PAUSED | RECORDING a.mcap";
+        let all = "  12.35 s | 1000 Hz, 2 skipped, 5 late | reply 45/80/121 us | fast 3, slow 17 | PAUSED | IN TURNS | RECORDING a.mcap";
         assert_eq!(status_line(&status, &moment), all);
     }
 }

@@ -84,6 +84,36 @@ impl Manipulation {
         self.turns.held.iter().filter(|body| self.roster.standing(**body as usize) == Standing::Held).count()
     }
 
+    /// After the forces of a tick were found: which touches are on islands that press bodies which wait.
+    pub(super) fn find_what_leans_on_waiting(&mut self, touches: &mut [Touch]) {
+        let Self { roster, room, pairs, driven, are_leaning, .. } = self;
+        let islands = room.solver.islands();
+        are_leaning.clear();
+        are_leaning.resize(islands.iter().len(), false);
+        let waits = |entity: usize| {
+            let standing = roster.numbers[entity].map(|body| roster.standing(body as usize));
+            standing.is_some_and(|standing| standing == Standing::Held || standing.is_away())
+                && driven.iter().all(|driven| driven.entity != entity)
+        };
+        for (_, pair) in pairs.iter_awake() {
+            let [one, other] = pair.entities;
+            for (leaning, fixed) in [(one, other), (other, one)] {
+                let place = roster.place_of_entity(leaning);
+                if let Some(island) = place.and_then(|place| islands.island_of(place))
+                    && waits(fixed)
+                    && pair.force_W(&room.rows) != Vector3::zeros()
+                {
+                    are_leaning[island] = true;
+                }
+            }
+        }
+        for touch in touches {
+            let place = roster.place_of_entity(touch.entity);
+            let island = place.and_then(|place| islands.island_of(place));
+            touch.leans_on_waiting = island.is_some_and(|island| are_leaning[island]);
+        }
+    }
+
     /// Before a tick: who is stepped in it.
     pub(super) fn take_turns(&mut self, entities: &mut [Entity], touches: &[Touch]) {
         let is_over = self.roster.awake().len() > self.turns.most;

@@ -131,3 +131,36 @@ fn a_heap_that_sleeps_wakes_no_farther_than_there_is_time_for_and_nothing_alloca
     assert!(world.made.held > 3, "{:?}", world.made);
     assert_eq!(counted, 0);
 }
+
+#[test]
+fn a_touch_tells_where_its_body_leans_on_who_waits() {
+    // A row of cubes, of which the last one leans on a wall, and one that stands apart.
+    let scene = || {
+        let mut entities = vec![floor(0.0, 2000.0, 0.5)];
+        let wall_at_W = Isometry3::translation(0.28, 0.05, 0.0);
+        entities.push(object(Cuboid::new([0.04, 0.1, 0.1]).unwrap(), wall_at_W, 2000.0, 0.5));
+        for at in 0..7 {
+            let at_W = Isometry3::translation(if at < 6 { 0.04 * f64::from(at) } else { -0.5 }, 0.02, 0.0);
+            entities.push(object(Cuboid::new([0.04; 3]).unwrap(), at_W, 1000.0, 0.5));
+        }
+        let bodies: Vec<_> = (2..entities.len()).map(|index| (index, body(&entities[index], 0.1))).collect();
+        World::new(entities, &bodies, Settings::default(), 1)
+    };
+    let leans = |most: usize, first_m: f64| {
+        let (mut world, mut leaning, mut touched) = (scene(), 0, 0);
+        for tick in 0..500 {
+            let hip = Vector3::new(first_m + 5e-5 * f64::from(tick), 0.02, 0.0);
+            world.manipulation.step_at_most(most, std::iter::once(hip));
+            world.step(&[hip]);
+            touched += world.touches.len();
+            leaning += world.touches.iter().filter(|touch| touch.leans_on_waiting).count();
+        }
+        assert!(touched > 400, "{touched}");
+        leaning
+    };
+    // What is fixed for good is a wall.
+    assert_eq!(leans(usize::MAX, -0.021), 0);
+    assert!(leans(4, -0.021) > 300, "{}", leans(4, -0.021));
+    // It pushes nobody.
+    assert_eq!(leans(4, -0.521), 0);
+}

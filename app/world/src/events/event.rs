@@ -122,6 +122,18 @@ pub enum Kind {
         /// Which finger.
         finger: u32,
     },
+    /// A finger feels less than it presses with, and goes through: what stops it would move if that had been stepped.
+    GaveWay {
+        /// Which finger.
+        finger: u32,
+    },
+    /// All that moves is more than a tick has time for: bodies wait for their turns, or do not any more.
+    Overload {
+        /// Which of the two.
+        change: Change,
+        /// How many wait; at the end, the most that did.
+        waiting: u32,
+    },
     /// The driver switched the motors off, which ends a run.
     Fault {
         /// Number of its fault in the shared-memory contract.
@@ -249,6 +261,10 @@ pub enum Class {
     Cut,
     /// [`Kind::Crowded`].
     Crowd,
+    /// [`Kind::GaveWay`].
+    GaveWay,
+    /// [`Kind::Overload`].
+    Overload,
     /// [`Kind::Fault`].
     Fault,
     /// [`Kind::Reset`] and [`Kind::Scene`].
@@ -261,7 +277,7 @@ pub enum Class {
 
 impl Class {
     /// All of them, with their words.
-    pub const ALL: [(Self, &str); 17] = [
+    pub const ALL: [(Self, &str); 19] = [
         (Self::Contact, "contacts"),
         (Self::Slip, "slips"),
         (Self::Pair, "pairs"),
@@ -275,6 +291,8 @@ impl Class {
         (Self::Door, "doors"),
         (Self::Cut, "cuts"),
         (Self::Crowd, "crowds"),
+        (Self::GaveWay, "gave-ways"),
+        (Self::Overload, "overloads"),
         (Self::Fault, "faults"),
         (Self::Reset, "resets"),
         (Self::Order, "orders"),
@@ -344,6 +362,8 @@ impl Kind {
             Self::Door { .. } => Class::Door,
             Self::Cut { .. } => Class::Cut,
             Self::Crowded { .. } => Class::Crowd,
+            Self::GaveWay { .. } => Class::GaveWay,
+            Self::Overload { .. } => Class::Overload,
             Self::Fault { .. } => Class::Fault,
             Self::Reset | Self::Scene { .. } => Class::Reset,
             Self::Order { .. } => Class::Order,
@@ -355,9 +375,10 @@ impl Kind {
     pub fn is_end(&self) -> bool {
         match self {
             Self::FingerTouch { change, .. } => matches!(change, Change::Ends | Change::Sticks),
-            Self::PairTouch { change, .. } | Self::Tie { change, .. } | Self::Trial { change, .. } => {
-                *change == Change::Ends
-            }
+            Self::PairTouch { change, .. }
+            | Self::Tie { change, .. }
+            | Self::Trial { change, .. }
+            | Self::Overload { change, .. } => *change == Change::Ends,
             Self::Release { .. } => true,
             Self::Button { is_pressed, .. } | Self::Key { is_pressed, .. } => !is_pressed,
             _ => false,
@@ -418,6 +439,11 @@ impl Kind {
                 Facts { finger: Some(finger), entity, force_n: Some(force_n), ..of("cut") }
             }
             Self::Crowded { finger } => Facts { finger: Some(finger), ..of("crowded") },
+            Self::GaveWay { finger } => Facts { finger: Some(finger), ..of("gave-way") },
+            Self::Overload { change, waiting } => {
+                let word = if change == Change::Ends { "overload-end" } else { "overload-begin" };
+                Facts { number: Some(waiting.into()), ..of(word) }
+            }
             Self::Fault { reason } => Facts { number: Some(reason), ..of("fault") },
             Self::Reset => of("reset"),
             Self::Scene { number } => Facts { number: Some(number.into()), ..of("scene") },

@@ -1,7 +1,7 @@
 //! The slow side of the two lists: steps what is in it, gives away what is claimed, says where it stands.
 
 use haptics::Entity;
-use physics::{Manipulation, Standing};
+use physics::{Made, Manipulation, Standing};
 
 use super::link::{Came, Claim, Most, SlowEnd, Stand, send, take_in};
 use crate::events::{Kind, PairForce, SlowPairs};
@@ -56,28 +56,46 @@ impl SlowList {
 
     /// A turn: takes in, gives away what is claimed, goes on by so many ticks of this length (s), and tells.
     pub fn turn(&mut self, ticks: u32, dt_s: f64) {
+        self.turn_while(ticks, dt_s, |_, _| true);
+    }
+
+    /// The same, as long as whoever is asked before each tick, with what the last one took, lets it go on; he may change how many
+    /// bodies it steps. Says how many ticks were made of which nothing was left undone.
+    pub fn turn_while(
+        &mut self,
+        ticks: u32,
+        dt_s: f64,
+        mut goes_on: impl FnMut(&mut Manipulation, Option<&Made>) -> bool,
+    ) -> u32 {
         self.take_orders();
         if !self.has_begun {
-            return;
+            return ticks;
         }
         self.take_in();
         if let Some(watch) = &mut self.watch {
             watch.begin_turn();
         }
         self.give_away();
-        let ticks = if self.is_paused { 0 } else { ticks };
-        for _ in 0..ticks {
-            if self.manipulation.awake().is_empty() {
+        let (mut whole, mut made) = (0, None);
+        for tick in 0..ticks {
+            if self.is_paused || (self.manipulation.awake().is_empty() && self.manipulation.held() == 0) {
+                whole += ticks - tick;
+                break;
+            }
+            if !goes_on(&mut self.manipulation, made.as_ref()) {
                 break;
             }
             self.manipulation.make_room(&self.entities);
-            let made = self.manipulation.step(&mut self.entities, &mut [], dt_s);
+            let step = self.manipulation.step(&mut self.entities, &mut [], dt_s);
             self.stepped += 1;
-            self.look(made.parked, dt_s);
+            self.look(step.parked, dt_s);
             // A tick of many bodies takes long, and a finger waits.
             self.give_away();
+            whole += u32::from(step.held == 0);
+            made = Some(step);
         }
         self.tell();
+        whole
     }
 
     /// Takes in everything that is on its way.

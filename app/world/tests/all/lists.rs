@@ -355,6 +355,34 @@ fn a_claim_that_overtakes_what_is_claimed_is_kept_until_that_has_come() {
 }
 
 #[test]
+fn a_turn_that_has_no_time_answers_claims_and_says_what_it_left_undone() {
+    let mut world = World::new(100, STRICT);
+    let bodies = world.lists.slow.manipulation().bodies().len();
+    // A tick a turn, and a tenth of all bodies in it.
+    let mut made = 0;
+    for tick in 0..400 {
+        let Lists { fast, hand_over, slow } = &mut world.lists;
+        let finger = (tick >= 200).then(|| finger_at(4.0, 0.0));
+        hand_over.begin_tick(fast, &mut world.entities, finger.into_iter());
+        fast.step(&mut world.entities, &mut [], DT);
+        hand_over.end_tick(fast, &world.entities);
+        let mut stepped = None;
+        let whole = slow.turn_while(10, DT, |manipulation, last| {
+            stepped = last.copied();
+            manipulation.step_at_most(bodies / 10, std::iter::empty());
+            last.is_none()
+        });
+        let step = stepped.expect("a tick");
+        assert!(step.awake + step.held <= bodies && step.awake <= bodies / 5, "{step:?}");
+        assert!(whole == 0, "{tick}: {whole}");
+        made += 1;
+    }
+    assert_eq!(made, 400);
+    let waits = world.lists.hand_over.handed().waits;
+    assert!(waits.count() > 0 && waits.most_ticks() <= 2, "{waits:?}");
+}
+
+#[test]
 fn while_time_stands_still_the_slow_list_steps_nothing_and_then_goes_on() {
     let mut world = World::new(1, STRICT);
     let Lists { hand_over, slow, .. } = &mut world.lists;
