@@ -39,8 +39,6 @@ pub struct Timing {
     pub cycle: Percentiles,
     /// From frame to reply, seen by the driver.
     pub round_trip: Percentiles,
-    /// The fast step.
-    pub step: Percentiles,
 }
 
 impl Baseline {
@@ -90,7 +88,11 @@ impl AttachmentTotals {
             wake_error: Percentiles::of(&self.wake_error),
             cycle: Percentiles::of(&self.cycle),
             round_trip: Percentiles::of(&self.round_trip),
-            step: Percentiles::of(&self.step),
         }
+    }
+
+    /// Those of our own steps.
+    pub fn step(&self) -> Percentiles {
+        Percentiles::of(&self.step)
     }
 }

@@ -16,6 +16,7 @@ use crate::room_supply::RoomSupply;
 use crate::row::{BodyRow, Row};
 use crate::row_queue::RowSender;
 use bytemuck::Zeroable;
+use rt_core::histogram::Histogram;
 use shm_abi::{Command, CommanderMemory, DriverState, DriverView, Frame};
 use std::time::Instant;
 use world::events::{Event, EventSender, Kind};
@@ -86,6 +87,8 @@ pub struct FastLoop {
     row: Row,
     /// What happened so far.
     pub tally: Tally,
+    /// Times of steps (ns): from the frame that was read to the answer, without waiting for anybody.
+    pub step_ns: Histogram,
 }
 
 /// Counts of a run, kept by the fast thread.
@@ -175,6 +178,7 @@ impl FastLoop {
             command: Command::zeroed(),
             row: Row::empty(),
             tally: Tally::default(),
+            step_ns: Histogram::new(),
         }
     }
 
@@ -308,13 +312,15 @@ impl FastLoop {
     fn render(&mut self, commander: &CommanderMemory, driver: &DriverView) {
         self.command = Command::zero(self.frame.tick, commander.lease(), self.frame.device_count);
         self.step.meet_driver(driver.abi_minor(), driver.ramp_in_ticks());
-        let begin = self.pace.map(|pace| (pace, Instant::now()));
-        self.step.step_at_most(begin.map_or(usize::MAX, |(pace, _)| pace.bodies()));
+        let begin = Instant::now();
+        self.step.step_at_most(self.pace.map_or(usize::MAX, |pace| pace.bodies()));
         self.step.step(&self.frame, &mut self.command, &mut self.row);
         commander.publish(&self.command, driver);
-        if let (Some(pace), Some((_, begin))) = (&mut self.pace, begin) {
+        let took_ns = begin.elapsed().saturating_sub(self.step.slow_turn()).as_nanos() as u64;
+        self.step_ns.record(took_ns);
+        if let Some(pace) = &mut self.pace {
             let made = self.step.made();
-            pace.take(begin.elapsed().as_nanos() as u64, made.awake, made.held > 0);
+            pace.take(took_ns, made.awake, made.held > 0);
         }
         self.supply.serve(&mut self.step);
     }
@@ -456,9 +462,15 @@ impl FastLoop {
         self.following = self.frame;
     }
 
+    /// Whether the next row would not have to wait, whatever moves.
+    pub fn has_room(&self) -> bool {
+        self.rows.has_room(self.step.bodies().len(), usize::MAX)
+    }
+
     fn push(&mut self, row: Row) {
         if self.when_full == WhenFull::Wait {
-            while self.rows.is_full() && !self.rows.is_abandoned() {
+            let others = self.displaced.pending().len();
+            while !self.rows.has_room(self.pending_bodies.len(), others) && !self.rows.is_abandoned() {
                 std::thread::yield_now();
             }
         }

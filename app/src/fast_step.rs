@@ -42,6 +42,7 @@ use physics::{Body, BodyError, Manipulation, Room, Wanted};
 use shm_abi::MAX_DEVICES;
 use shm_abi::frame::DEVICE_POSITION_VALID;
 use shm_abi::{Command, Frame};
+use std::time::Duration;
 use world::Layout;
 use world::lists::{Handed, ListSettings, Lists, SlowList};
 
@@ -235,6 +236,11 @@ impl FastStep {
     /// or waited for its turn.
     pub fn gives_way(&self) -> &[bool] {
         &self.objects.gives_way
+    }
+
+    /// How long the slow list had its turn in the last tick: no time of the fast step.
+    pub fn slow_turn(&self) -> Duration {
+        self.objects.slow_turn
     }
 
     /// From now on no more of what moves than this is stepped in a tick here ([`Manipulation::step_at_most`]).

@@ -204,7 +204,10 @@ impl FastThread {
         if end == FastEnd::Finished && !self.shared.outlasts.is_zero() {
             self.outlast_lease();
         }
-        FastRemains { fast: self.fast, driver: self.driver, step_ns: self.step_ns, end }
+        // Where the clock waits, waiting is part of a turn.
+        let is_real = self.driver.info().clock_mode == ClockMode::Real;
+        let step_ns = if is_real { self.step_ns } else { self.fast.step_ns.clone() };
+        FastRemains { fast: self.fast, driver: self.driver, step_ns, end }
     }
 
     /// Whoever ends the lease takes some milliseconds to see that the run is over: ticks that the driver would count as

@@ -7,7 +7,7 @@ use crate::lists_end::ListsEnd;
 use crate::record::Recorded;
 use crate::record::destination::{is_standard_output, shown};
 use crate::snapshots::Drawn;
-use io_driver::status::CounterStatus;
+use io_driver::status::{CounterStatus, Percentiles};
 use rt_core::plain_text::Plain;
 use rt_core::setup::SetupReport;
 use rustix::fs::{FileType, fstat};
@@ -29,6 +29,8 @@ pub struct Report {
     pub counters: CounterStatus,
     /// The driver's timing and ours; none on a clock that is not real.
     pub timing: Option<Timing>,
+    /// The fast step's, on any clock.
+    pub step: Percentiles,
     /// What was obtained: the driver's words, and the fast thread's.
     pub guarantees: Option<(String, SetupReport)>,
     /// What became of entities that stand still since, a line each.
@@ -101,7 +103,9 @@ impl fmt::Display for Report {
             writeln!(f, "wake error   {}", timing.wake_error)?;
             writeln!(f, "driver work  {}", timing.cycle)?;
             writeln!(f, "round trip   {}", timing.round_trip)?;
-            writeln!(f, "fast step    {}", timing.step)?;
+        }
+        if self.step.count > 0 {
+            writeln!(f, "fast step    {}", self.step)?;
         }
         writeln!(
             f,

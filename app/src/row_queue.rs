@@ -73,9 +73,10 @@ fn touched<T: Clone>(places: usize, with: T) -> (Producer<T>, Consumer<T>) {
 }
 
 impl RowSender {
-    /// Whether there is no room for another row.
-    pub fn is_full(&self) -> bool {
-        self.rows.is_full()
+    /// Whether there is room for another row with so many bodies and so many others that were moved.
+    pub fn has_room(&self, bodies: usize, others: usize) -> bool {
+        let others = others.min(PLACED_QUEUE);
+        !self.rows.is_full() && self.bodies.slots() >= bodies && self.placed.slots() >= others
     }
 
     /// Whether nobody will ever take a row.
@@ -93,7 +94,7 @@ impl RowSender {
     /// which is left for the next row.
     pub fn send_with(&mut self, row: Row, bodies: &[(u32, BodyRow)], placed: &mut Vec<Placed>) -> bool {
         let others = placed.len().min(PLACED_QUEUE);
-        if self.rows.is_full() || self.bodies.slots() < bodies.len() || self.placed.slots() < others {
+        if !self.has_room(bodies.len(), others) {
             return false;
         }
         for other in placed.drain(..others) {

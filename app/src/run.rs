@@ -30,6 +30,7 @@ use io_driver::device::Extras;
 use io_driver::log_thread;
 use io_driver::open::open_devices_with;
 use io_driver::say::say;
+use io_driver::status::Percentiles;
 use physics::Reason;
 use rt_core::signals::StopSignals;
 use rt_core::time_namespace;
@@ -286,6 +287,7 @@ fn run_virtual(
         tally: fast.tally,
         counters: io_driver::status::CounterStatus::of(driver.view()),
         timing: None,
+        step: Percentiles::of(&fast.step_ns),
         guarantees: None,
         parked: parked(&fast.tally, rig),
         events,
@@ -358,6 +360,7 @@ fn run_two_processes(
         tally: end.tally,
         counters: totals.counters,
         timing: is_real.then(|| totals.timing()),
+        step: totals.step(),
         drivers: totals.drivers,
         guarantees: is_real.then(|| (end.driver.info().setup_report, end.fast_report)),
         parked: parked(&end.tally, rig),

@@ -79,6 +79,10 @@ impl VirtualDriver {
     ) -> Stop {
         for tick in 1.. {
             let turn = self.tick(tick, fast);
+            // The same thread fills the queue and empties it: of many things few rows fit in.
+            if !fast.has_room() {
+                slow.step();
+            }
             if tick % SLOW_EVERY == 0 {
                 slow.step();
                 progress.show(fast.run_ticks());

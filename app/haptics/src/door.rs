@@ -13,7 +13,8 @@
 //! and the space that the centre is in is felt.
 //!
 //! On the other side contacts begin on the way from the god-objects to the HIP, so a floor that goes on holds on; what
-//! does not go on is left with its force, which fades within [`FADE_S`].
+//! does not go on is left with its force, which fades within [`FADE_S`]. So does that of a wall that was pressed beside the
+//! opening when the finger comes into it.
 //!
 //! Frames: W world, B the hull's, D the door's. Invariants: a finger crosses a door once in a tick; whoever is not through
 //! is in front, to [`ON_M`]. Cost: nothing without doors; of each door of the finger's space some comparisons.
@@ -30,6 +31,8 @@ use crate::touch_points::TouchPoint;
 pub const WORLD: u32 = 0;
 /// A surface so near to a door's rectangle is open in it \[m\].
 pub const SLAB_M: f64 = 1e-3;
+/// Walls of doors that are felt at once: a corner has three.
+const MOST_OPEN: usize = 8;
 /// What is left behind at a door fades within this time \[s\].
 pub const FADE_S: f64 = 0.02;
 /// Surfaces with less of their normal than this along the door's z are its jambs, its floor and its lintel.
@@ -126,6 +129,8 @@ pub struct Passage {
     /// What it left behind, and for how long it has been fading (s).
     left_W: Vector3<f64>,
     fading_s: f64,
+    /// Forces of the last tick (N) of contacts with what is open in doors.
+    felt: [Option<(usize, Vector3<f64>)>; MOST_OPEN],
 }
 
 #[derive(Debug, Clone, Copy)]
@@ -137,13 +142,15 @@ struct Seen {
 impl Passage {
     /// Of a finger that was not seen yet.
     pub fn new(doors: &[Door]) -> Self {
-        Self { seen: vec![None; doors.len()].into(), left_W: Vector3::zeros(), fading_s: FADE_S }
+        let seen = vec![None; doors.len()].into();
+        Self { seen, left_W: Vector3::zeros(), fading_s: FADE_S, felt: [None; MOST_OPEN] }
     }
 
     /// The finger is somewhere else: nobody saw how it came there.
     pub fn reset(&mut self) {
         self.seen.fill(None);
         self.fading_s = FADE_S;
+        self.felt.fill(None);
     }
 
     /// A tick of a finger, which `step` does: once, or, in the tick in which it goes through a door, once on either side.
@@ -162,8 +169,10 @@ impl Passage {
             return (output, None);
         }
         let passed = self.look(finger, entities, doors);
+        let mut left_W = Vector3::zeros();
         if passed.is_open {
             output = finger.output(entities);
+            left_W = self.left_open_W(finger, &moves);
         }
         if let Some(crossing) = &passed.crossing {
             let stays_W = |finger: &Finger| -> Vector3<f64> {
@@ -171,7 +180,7 @@ impl Passage {
                 fixed.map(|contact| contact.force_on_user_W).sum()
             };
             // What it meets in this tick alone it would have met behind the door, on this side.
-            let left_W = if crossing.drags { stays_W(finger) } else { Vector3::zeros() };
+            let dragged_W = if crossing.drags { stays_W(finger) } else { Vector3::zeros() };
             finger.go_through(crossing);
             output = step(finger);
             self.crossed(crossing, doors, entities);
@@ -179,10 +188,14 @@ impl Passage {
             if self.look(finger, entities, doors).is_open {
                 output = finger.output(entities);
             }
-            if left_W != Vector3::zeros() {
-                (self.left_W, self.fading_s) = (left_W - stays_W(finger), 0.0);
+            if dragged_W != Vector3::zeros() {
+                left_W += dragged_W - stays_W(finger);
             }
         }
+        if left_W != Vector3::zeros() {
+            (self.left_W, self.fading_s) = (self.left_W * self.share() + left_W, 0.0);
+        }
+        self.note(finger, doors);
         output.force_on_user_W += self.fade(dt_s);
         (output, passed.crossing)
     }
@@ -227,12 +240,37 @@ impl Passage {
         }
     }
 
+    /// Forces of the last tick (N) of what a door has opened in this one.
+    fn left_open_W(&self, finger: &Finger, moves: impl Fn(usize) -> bool) -> Vector3<f64> {
+        let left = self
+            .felt
+            .iter()
+            .flatten()
+            .filter(|(entity, _)| !moves(*entity) && finger.contact(*entity).is_none());
+        left.map(|(_, force_W)| force_W).sum()
+    }
+
+    fn note(&mut self, finger: &Finger, doors: &[Door]) {
+        self.felt.fill(None);
+        let is_opened =
+            |entity: usize| doors.iter().any(|door| door.opens.binary_search(&(entity as u32)).is_ok());
+        let felt = finger.contacts().filter(|contact| is_opened(contact.entity));
+        for (place, contact) in self.felt.iter_mut().zip(felt) {
+            *place = Some((contact.entity, contact.force_on_user_W));
+        }
+    }
+
+    /// What is left of what fades.
+    fn share(&self) -> f64 {
+        (1.0 - self.fading_s / FADE_S).max(0.0)
+    }
+
     /// What of the force that was left behind is still felt in this tick (N); the tick of the crossing has all of it.
     fn fade(&mut self, dt_s: f64) -> Vector3<f64> {
         if self.fading_s >= FADE_S || !is_finite(&self.left_W) {
             return Vector3::zeros();
         }
-        let share = 1.0 - self.fading_s / FADE_S;
+        let share = self.share();
         // Where time is unknown nothing lasts.
         self.fading_s = if dt_s > 0.0 { self.fading_s + dt_s } else { FADE_S };
         self.left_W * share

@@ -13,6 +13,7 @@ use physics::{
     Attachment, BroadPhase, FingerSettings, FingerTick, MAX_DRIVEN, MAX_PULLS, Made, Manipulation, Pull,
     Touch,
 };
+use std::time::{Duration, Instant};
 use world::events::{FastPairs, pair_link};
 use world::lists::{FastList, Handed, Reach, SlowList};
 
@@ -87,6 +88,8 @@ pub struct Objects {
     pub(super) most_stepped: usize,
     /// What the last tick took.
     pub made: Made,
+    /// How long the slow list had its turn in it.
+    pub(super) slow_turn: Duration,
     /// By how much it moved them (s).
     pub(super) stepped_s: f64,
 }
@@ -136,6 +139,7 @@ impl Objects {
             gives_way: vec![false; fingers.len()],
             most_stepped: usize::MAX,
             made: Made::default(),
+            slow_turn: Duration::ZERO,
             stepped_s: 0.0,
         };
         objects.note_all();
@@ -205,9 +209,12 @@ impl Objects {
         self.moved.tell(&mut lists.hand_over, entities);
         lists.ticks += u32::from(is_running && !self.is_paused);
         lists.passed += 1;
+        self.slow_turn = Duration::ZERO;
         if let Some(slow) = lists.slow.as_mut().filter(|_| lists.passed >= SLOW_EVERY) {
+            let begin = Instant::now();
             slow.turn(lists.ticks, self.period_s);
             (lists.ticks, lists.passed) = (0, 0);
+            self.slow_turn = begin.elapsed();
         }
     }
 

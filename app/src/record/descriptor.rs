@@ -89,12 +89,31 @@ impl MessageType {
         Self { name: name.into(), fields: fields.iter().map(field).collect() }
     }
 
+    /// Whether names in JSON are not unique, which come without underscores where nothing else is said: readers refuse that.
+    fn has_like_json_names(&self) -> bool {
+        let mut taken = std::collections::HashSet::new();
+        self.fields.iter().any(|field| !taken.insert(json_name(&field.name)))
+    }
+
     /// With these as well, of which there may be several.
     pub(super) fn with_repeated(mut self, fields: &[(u32, &str, Kind)]) -> Self {
         let more = Self::new("", fields).fields;
         self.fields.extend(more.into_iter().map(|field| Field { is_repeated: true, ..field }));
         self
     }
+}
+
+/// A field's name in JSON, unless it has one of its own: what is behind an underscore is written large.
+fn json_name(name: &str) -> String {
+    let mut is_behind = false;
+    let mut json = String::new();
+    for letter in name.chars() {
+        if letter != '_' {
+            json.push(if is_behind { letter.to_ascii_uppercase() } else { letter });
+        }
+        is_behind = letter == '_';
+    }
+    json
 }
 
 /// A `FileDescriptorSet` of these files.
@@ -114,15 +133,16 @@ fn write_file(out: &mut Message, file: &ProtoFile) {
     for message in &file.messages {
         out.message(4, |out| {
             out.text(1, &message.name);
+            let is_ambiguous = message.has_like_json_names();
             for field in &message.fields {
-                out.message(2, |out| write_field(out, field));
+                out.message(2, |out| write_field(out, field, is_ambiguous));
             }
         });
     }
     out.text(12, "proto3");
 }
 
-fn write_field(out: &mut Message, field: &Field) {
+fn write_field(out: &mut Message, field: &Field, has_json_name: bool) {
     const OPTIONAL: u64 = 1;
     const REPEATED: u64 = 3;
     out.text(1, &field.name)
@@ -131,5 +151,8 @@ fn write_field(out: &mut Message, field: &Field) {
         .whole(5, field.kind.number());
     if let Kind::Message(name) = field.kind {
         out.text(6, name);
+    }
+    if has_json_name {
+        out.text(10, &field.name);
     }
 }

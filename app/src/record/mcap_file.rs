@@ -48,6 +48,8 @@ const CHUNK_NS: u64 = 500_000_000;
 const CHUNK_BYTES: usize = 4 << 20;
 /// More than this no chunk has: readers of ours take twice as much.
 pub(super) const MOST_CHUNK_BYTES: usize = 32 << 20;
+/// Most bytes of a body in a tick.
+const MOST_BODY_BYTES: usize = 256;
 /// Most bytes of a message besides its content.
 const MESSAGE_HEAD_BYTES: usize = 32;
 /// Between two pictures (ns).
@@ -74,6 +76,9 @@ pub struct McapFile {
     channels: Channels,
     message: Message,
     sequence: u32,
+    /// The chunk has a tick with all bodies, and the newest one these.
+    chunk_has_all: bool,
+    last_bodies: Vec<BodyRow>,
     /// What the chunk has, and its first tick.
     chunk_bytes: usize,
     chunk_rows: u64,
@@ -151,6 +156,8 @@ impl McapFile {
             channels,
             message: Message::new(),
             sequence: 0,
+            chunk_has_all: false,
+            last_bodies: Vec::new(),
             chunk_bytes: 0,
             chunk_rows: 0,
             chunk_began: 0,
@@ -239,7 +246,7 @@ impl McapFile {
         self.writer.flush()?;
         self.rows += self.chunk_rows;
         self.last_tick = self.last_in_chunk;
-        (self.chunk_rows, self.chunk_bytes) = (0, 0);
+        (self.chunk_rows, self.chunk_bytes, self.chunk_has_all) = (0, 0, false);
         Ok(())
     }
 
@@ -358,7 +365,17 @@ impl McapFile {
     fn put_row(&mut self, row: &Row, bodies: &[BodyRow]) -> Result<(), McapError> {
         let mut message = std::mem::take(&mut self.message);
         message.clear();
-        tick::write(&mut message, row, bodies, &self.names, self.period_ns);
+        if self.chunk_bytes + MOST_BODY_BYTES * bodies.len() > MOST_CHUNK_BYTES {
+            // Or this tick might be the first of another chunk, without all that has not changed.
+            self.end_chunk()?;
+        }
+        let before = self.chunk_has_all.then_some(&self.last_bodies[..]);
+        tick::write(&mut message, row, (bodies, before), &self.names, self.period_ns);
+        self.chunk_has_all = true;
+        if bodies.len() > tick::ALWAYS {
+            self.last_bodies.clear();
+            self.last_bodies.extend_from_slice(bodies);
+        }
         let mut written = self.put(self.channels.tick, row.run_tick, message.bytes());
         let time_ns = self.time_ns(row.run_tick);
         if time_ns >= self.next_picture {

@@ -239,7 +239,7 @@ impl Recorder {
             return;
         }
         // Before the row itself: whoever finds the row finds what is missing in front of it.
-        if !self.rows.is_full() {
+        if self.rows.has_room(0, 0) {
             self.tell_gap(row.run_tick);
         }
         self.changed.clear();

@@ -20,10 +20,30 @@ pub(super) const ORDER: &str = "phantom3.Order";
 pub(super) mod tick {
     pub(in crate::record) const TICK: u32 = 1;
     pub(in crate::record) const T: u32 = 2;
+    /// Of the first message with further objects; the others follow.
+    const FIRST_PART: u32 = 3;
     /// Of the first finger; the others follow.
     const FIRST_FINGER: u32 = 16;
     /// Of the first object; the others follow.
     const FIRST_OBJECT: u32 = 64;
+    /// Objects of one message: a common library takes messages of 64 KiB, and each field of one is 8 bytes.
+    const MOST_IN_ONE: usize = 7000;
+    /// Names of the messages with further objects, and of their fields.
+    pub(in crate::record) const PARTS: [[&str; 3]; 13] = [
+        ["More2", ".phantom3.More2", "more_2"],
+        ["More3", ".phantom3.More3", "more_3"],
+        ["More4", ".phantom3.More4", "more_4"],
+        ["More5", ".phantom3.More5", "more_5"],
+        ["More6", ".phantom3.More6", "more_6"],
+        ["More7", ".phantom3.More7", "more_7"],
+        ["More8", ".phantom3.More8", "more_8"],
+        ["More9", ".phantom3.More9", "more_9"],
+        ["More10", ".phantom3.More10", "more_10"],
+        ["More11", ".phantom3.More11", "more_11"],
+        ["More12", ".phantom3.More12", "more_12"],
+        ["More13", ".phantom3.More13", "more_13"],
+        ["More14", ".phantom3.More14", "more_14"],
+    ];
     /// Numbers that the encoding keeps to itself.
     const RESERVED: std::ops::Range<u32> = 19_000..20_000;
 
@@ -36,6 +56,25 @@ pub(super) mod tick {
     pub(in crate::record) fn of_object(index: usize) -> u32 {
         let number = FIRST_OBJECT + index as u32;
         if number < RESERVED.start { number } else { number + RESERVED.len() as u32 }
+    }
+
+    /// Objects of each message: of the tick itself, then of those with further ones; the last one has all the rest.
+    pub(in crate::record) fn parts(objects: usize) -> impl Iterator<Item = std::ops::Range<usize>> {
+        let count = objects.div_ceil(MOST_IN_ONE).clamp(1, PARTS.len() + 1);
+        (0..count).map(move |part| {
+            let end = if part + 1 == count { objects } else { MOST_IN_ONE * (part + 1) };
+            MOST_IN_ONE * part..end
+        })
+    }
+
+    /// The field of a message with further objects, the first of which is the second one.
+    pub(in crate::record) fn of_part(part: usize) -> u32 {
+        FIRST_PART + part as u32 - 1
+    }
+
+    /// Which object is the first of the message that a field is.
+    pub(in crate::record) fn first_of_part(field: u32) -> Option<usize> {
+        (FIRST_PART..FIRST_FINGER).contains(&field).then(|| MOST_IN_ONE * (field - FIRST_PART + 1) as usize)
     }
 
     /// Which finger a field is.
@@ -168,19 +207,30 @@ pub(super) fn descriptors(names: &Names) -> Vec<u8> {
     let fields = field_names(names);
     let of_fingers =
         (0..names.fingers.len()).map(|index| (tick::of_finger(index), Message(".phantom3.Finger")));
-    let of_objects =
-        (0..names.bodies.len()).map(|index| (tick::of_object(index), Message(".phantom3.Object")));
-    let members =
-        of_fingers.chain(of_objects).zip(&fields).map(|((number, kind), name)| (number, &**name, kind));
-    let all: Vec<_> =
+    let (fingers, bodies) = fields.split_at(names.fingers.len());
+    let objects = |range: std::ops::Range<usize>| {
+        let of_message = (0..).map(|index| (tick::of_object(index), Message(".phantom3.Object")));
+        of_message.zip(&bodies[range]).map(|((number, kind), name)| (number, &**name, kind))
+    };
+    let mut parts = tick::parts(bodies.len());
+    let own = parts.next().unwrap_or_default();
+    let members = of_fingers.zip(fingers).map(|((number, kind), name)| (number, &**name, kind));
+    let mut all: Vec<_> =
         [(tick::TICK, "tick", Uint64), (tick::T, "t", Double)].into_iter().chain(members).collect();
+    all.extend(objects(own));
+    let (mut more, mut of_parts) = (Vec::new(), Vec::new());
+    for ((part, range), [name, full_name, field]) in (1..).zip(parts).zip(tick::PARTS) {
+        more.push(MessageType::new(name, &objects(range).collect::<Vec<_>>()));
+        of_parts.push((tick::of_part(part), field, Message(full_name)));
+    }
+    all.extend(of_parts);
     let tick = MessageType::new("Tick", &all);
     let mut files = foxglove::files();
     files.push(ProtoFile {
         name: "phantom3.proto",
         package: "phantom3",
         imports: &[foxglove::FILE],
-        messages: vec![finger, object, tick, event, order],
+        messages: [finger, object, tick, event, order].into_iter().chain(more).collect(),
     });
     descriptor_set(&files)
 }
@@ -188,6 +238,8 @@ pub(super) fn descriptors(names: &Names) -> Vec<u8> {
 /// What the fields of `phantom3.Tick` are called: of the fingers, then of the objects.
 pub(super) fn field_names(names: &Names) -> Vec<String> {
     let mut taken: std::collections::HashSet<String> = ["tick", "t"].map(Into::into).into();
+    let parts = tick::parts(names.bodies.len()).count();
+    taken.extend(tick::PARTS[..parts - 1].iter().map(|[.., field]| (*field).to_owned()));
     let mut claim = |name: &String| {
         let plain: String = name.replace('-', "_");
         let is_word = plain.starts_with(|first: char| first.is_ascii_alphabetic() || first == '_');
@@ -223,6 +275,18 @@ mod tests {
             assert!(!(19_000..20_000).contains(&tick::of_object(index)));
         }
         assert_eq!(tick::finger(tick::of_finger(7)), Some(7));
+        for objects in [0, 1, 7000, 7001, 50_000, 98_000, 200_000] {
+            let parts: Vec<_> = tick::parts(objects).collect();
+            assert!(parts[0].start == 0 && parts.last().is_some_and(|last| last.end == objects), "{objects}");
+            for (part, range) in parts.iter().enumerate().skip(1) {
+                assert_eq!(
+                    (range.start, range.start),
+                    (parts[part - 1].end, tick::first_of_part(tick::of_part(part)).unwrap())
+                );
+                assert!(range.len() <= 7000 || objects > 98_000);
+            }
+        }
+        assert_eq!([2, 16].map(tick::first_of_part), [None, None]);
         assert_eq!(tick::finger(tick::of_object(0)), None);
     }
 }

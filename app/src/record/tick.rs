@@ -13,15 +13,38 @@ use nalgebra::{Quaternion, Vector3};
 use physics::GraspQuality;
 use shm_abi::MAX_DEVICES;
 
-/// Writes a row and its bodies into an empty message.
-pub(super) fn write(out: &mut Message, row: &Row, bodies: &[BodyRow], names: &Names, period_ns: u64) {
+/// So many objects are written in every tick.
+pub(super) const ALWAYS: usize = 64;
+
+/// Writes a row and its bodies into an empty message: of more than [`ALWAYS`] those that are not as they were in the tick
+/// `before`, or all.
+pub(super) fn write(
+    out: &mut Message,
+    row: &Row,
+    (bodies, before): (&[BodyRow], Option<&[BodyRow]>),
+    names: &Names,
+    period_ns: u64,
+) {
     out.whole(tick::TICK, row.run_tick);
     out.double(tick::T, run_time_s(row.run_tick.cast_signed(), period_ns));
     for (index, (_, finger)) in names.fingers.iter().zip(&row.fingers).enumerate() {
         out.message(tick::of_finger(index), |out| write_finger(out, finger, index, names));
     }
-    for (index, body) in bodies.iter().enumerate() {
-        out.message(tick::of_object(index), |out| write_body(out, body, names));
+    let before = before.filter(|_| bodies.len() > ALWAYS);
+    let is_new = |index: usize| before.is_none_or(|before| before.get(index) != Some(&bodies[index]));
+    let write_part = |out: &mut Message, part: std::ops::Range<usize>| {
+        for (field, index) in (0..).map(tick::of_object).zip(part).filter(|(_, index)| is_new(*index)) {
+            out.message(field, |out| write_body(out, &bodies[index], names));
+        }
+    };
+    for (number, part) in tick::parts(bodies.len()).enumerate() {
+        match number {
+            0 => write_part(out, part),
+            _ if part.clone().any(is_new) => {
+                out.message(tick::of_part(number), |out| write_part(out, part));
+            }
+            _ => {}
+        }
     }
 }
 
@@ -77,24 +100,33 @@ fn write_body(out: &mut Message, body: &BodyRow, names: &Names) {
     }
 }
 
-/// Reads a row and its bodies; `None` if the message is none, or not of this scene.
-pub(super) fn read(message: &[u8], names: &Names) -> Option<(Row, Vec<BodyRow>)> {
+/// Reads a row and its bodies, of which those that are not told are as `before`; `None` if the message is none, or not of this
+/// scene.
+pub(super) fn read(message: &[u8], names: &Names, before: Option<&[BodyRow]>) -> Option<(Row, Vec<BodyRow>)> {
     let mut row = Row::empty();
-    let mut bodies = vec![BodyRow::default(); names.bodies.len()];
-    let mut members = 0;
+    let before = before.filter(|before| before.len() == names.bodies.len());
+    let mut bodies = before.map_or_else(|| vec![BodyRow::default(); names.bodies.len()], <[BodyRow]>::to_vec);
+    let (mut fingers, mut objects) = (0, 0);
     each_field(message, |field, value| {
         if field == tick::TICK {
             row.run_tick = value.whole()?;
         } else if let Some(index) = tick::finger(field) {
             *row.fingers.get_mut(index)? = read_finger(value.bytes()?, index, names)?;
-            members += 1;
+            fingers += 1;
         } else if let Some(index) = tick::object(field) {
             *bodies.get_mut(index)? = read_body(value.bytes()?)?;
-            members += 1;
+            objects += 1;
+        } else if let Some(first) = tick::first_of_part(field) {
+            each_field(value.bytes()?, |field, value| {
+                *bodies.get_mut(first + tick::object(field)?)? = read_body(value.bytes()?)?;
+                objects += 1;
+                Some(())
+            })?;
         }
         Some(())
     })?;
-    (members == names.fingers.len().min(MAX_DEVICES) + bodies.len()).then_some((row, bodies))
+    let are_all = objects == bodies.len() || (before.is_some() && objects < bodies.len());
+    (fingers == names.fingers.len().min(MAX_DEVICES) && are_all).then_some((row, bodies))
 }
 
 fn read_finger(message: &[u8], index: usize, names: &Names) -> Option<FingerRow> {
@@ -245,21 +277,44 @@ mod tests {
             is_slow: true,
         }];
         let mut message = Message::new();
-        write(&mut message, &row, &bodies, &names(), 1_000_000);
-        let (back, bodies_back) = read(message.bytes(), &names()).expect("a tick");
+        write(&mut message, &row, (&bodies, None), &names(), 1_000_000);
+        let (back, bodies_back) = read(message.bytes(), &names(), None).expect("a tick");
         assert_eq!((back, &bodies_back[..]), (row, &bodies[..]));
         assert_eq!(cells(&back, &bodies_back), cells(&row, &bodies), "negative zeros among them");
     }
 
     #[test]
+    fn of_many_bodies_a_tick_tells_those_that_changed_and_needs_the_one_before() {
+        for count in [ALWAYS, 1000, 16_000] {
+            let bodies: Vec<String> = (0..count).map(|body| format!("body{body}")).collect();
+            let names = Names { fingers: Vec::new(), bodies, ..names() };
+            let body = |x: f64| BodyRow { position: Vector3::new(x, 1.0, -0.0), ..BodyRow::default() };
+            let first: Vec<_> = (0..count).map(|number| body(number as f64)).collect();
+            let mut second = first.clone();
+            [0, 17, count - 1].into_iter().for_each(|changed| second[changed] = body(-1.5));
+            let message = |bodies: &[BodyRow], before: Option<&[BodyRow]>| {
+                let mut message = Message::new();
+                write(&mut message, &Row::empty(), (bodies, before), &names, 1_000_000);
+                message.bytes().to_vec()
+            };
+            let [whole, changes] = [message(&first, None), message(&second, Some(&first))];
+            assert_eq!(changes.len() < 500, count > ALWAYS, "{count}: {} of {}", changes.len(), whole.len());
+            let all = read(&whole, &names, None).expect("all").1;
+            assert_eq!(all, first, "{count}");
+            assert_eq!(read(&changes, &names, Some(&all)).expect("changes").1, second, "{count}");
+            assert_eq!(read(&changes, &names, None).is_none(), count > ALWAYS, "{count}");
+        }
+    }
+
+    #[test]
     fn a_message_of_another_scene_or_cut_short_is_no_row() {
         let mut message = Message::new();
-        write(&mut message, &Row::empty(), &[BodyRow::default()], &names(), 1_000_000);
-        assert!(read(message.bytes(), &names()).is_some());
+        write(&mut message, &Row::empty(), (&[BodyRow::default()], None), &names(), 1_000_000);
+        assert!(read(message.bytes(), &names(), None).is_some());
         let fewer = Names { bodies: Vec::new(), ..names() };
-        assert!(read(message.bytes(), &fewer).is_none());
+        assert!(read(message.bytes(), &fewer, None).is_none());
         let more = Names { bodies: vec!["cube".into(), "ball".into()], ..names() };
-        assert!(read(message.bytes(), &more).is_none());
-        assert!(read(&message.bytes()[..message.bytes().len() - 1], &names()).is_none());
+        assert!(read(message.bytes(), &more, None).is_none());
+        assert!(read(&message.bytes()[..message.bytes().len() - 1], &names(), None).is_none());
     }
 }

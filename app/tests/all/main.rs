@@ -12,3 +12,4 @@ mod orders;
 mod reply_modes;
 mod study_stiffness;
 mod two_lists;
+mod virtual_run;

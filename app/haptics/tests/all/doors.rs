@@ -248,6 +248,32 @@ fn a_finger_that_is_pressed_on_the_hull_slides_into_the_opening_and_goes_through
 }
 
 #[test]
+fn what_pressed_beside_the_opening_fades_when_a_finger_slides_into_it() {
+    for (friction, radius) in
+        [(Friction::None, 0.0), (Friction::coulomb(0.4).unwrap(), 0.0), (Friction::None, 2e-3)]
+    {
+        for out_again in [false, true] {
+            let depth = if out_again { -0.02 } else { 0.02 };
+            let mut visit = Visit::new(solid_hull(), &friction, radius);
+            if out_again {
+                visit.finger = visit.finger.within(INSIDE);
+                visit.go(v(0.035, 0.0, 0.0));
+            } else {
+                visit.go(v(0.035, 0.0, 0.06));
+            }
+            let (pressing, _) = visit.go(v(0.035, 0.0, DOOR_Z - depth));
+            let pressed = pressing.force_on_user_W.norm();
+            assert!(pressed > 0.9 * K * 0.02, "{pressed}");
+            let (_, jump) = visit.go(v(0.0, 0.0, DOOR_Z - depth));
+            // All of it within 20 ticks.
+            assert!(jump < pressed * (DT / FADE_S) * 1.1 + 3.0 * A_STEP_N, "{radius} m: {jump} of {pressed}");
+            let still = (0..21).map(|_| visit.step(v(0.0, 0.0, DOOR_Z - depth)).force_on_user_W.norm());
+            assert_eq!(still.last(), Some(0.0), "{radius} m");
+        }
+    }
+}
+
+#[test]
 fn a_ball_goes_through_an_opening_that_it_fits_and_feels_the_rim_of_one_that_is_there() {
     let radius = 5e-3;
     for (name, hull) in hulls() {

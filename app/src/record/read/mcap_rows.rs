@@ -36,6 +36,8 @@ pub(super) struct McapRows {
     order: TickOrder,
     channels: Channels,
     first: Option<(Row, Vec<BodyRow>)>,
+    /// The bodies of the last tick of this chunk: one that is not told again is as it was.
+    before: Option<Vec<BodyRow>>,
     rows: u64,
     pub(super) names: Names,
     pub(super) period_ns: u64,
@@ -88,6 +90,7 @@ impl McapRows {
             order: TickOrder::default(),
             channels: Channels::default(),
             first: None,
+            before: None,
             rows: 0,
             names: Names::default(),
             period_ns: 0,
@@ -138,7 +141,7 @@ impl McapRows {
                 return Err(self.damaged(&why));
             }
             self.chunk.at = self.chunk.records.len() - behind.len();
-            let found = own(opcode, body, self.channels, &self.names);
+            let found = own(opcode, body, self.channels, (&self.names, self.before.as_deref()));
             return self.keep(found);
         }
         loop {
@@ -151,7 +154,7 @@ impl McapRows {
                     }
                 }
                 Some(Ok(LinearReadEvent::Record { opcode, data })) => {
-                    let found = own(opcode, data, self.channels, &self.names);
+                    let found = own(opcode, data, self.channels, (&self.names, self.before.as_deref()));
                     return self.keep(found);
                 }
                 Some(Err(McapError::UnexpectedEof)) => {
@@ -197,11 +200,15 @@ impl McapRows {
             Kept::Row(row) => {
                 let (row, bodies) = (*row).ok_or_else(|| self.damaged("a tick is no tick of this scene"))?;
                 self.order.check(row.run_tick, self.period_ns).map_err(|why| self.damaged(&why))?;
+                self.before = (bodies.len() > tick::ALWAYS).then(|| bodies.clone());
                 return Ok(Found::Row(Box::new(row), bodies));
             }
             Kept::Facts(name, facts) if name == ABOUT || name == COLUMNS => self.take_facts(&name, facts)?,
             Kept::Facts(name, facts) if name == END => self.end(&facts)?,
-            Kept::Chunk(Ok(records)) => self.chunk = OpenChunk { records, at: 0 },
+            Kept::Chunk(Ok(records)) => {
+                self.chunk = OpenChunk { records, at: 0 };
+                self.before = None;
+            }
             Kept::Chunk(Err(ChunkError::Damage(why))) => return Err(self.damaged(&why)),
             Kept::Chunk(Err(ChunkError::Memory)) => {
                 return Err(ReadError::Memory { file: self.path.clone(), rows: self.rows });
@@ -304,14 +311,14 @@ enum Kept {
     Damage(RecordError),
 }
 
-fn own(opcode: u8, body: &[u8], channels: Channels, names: &Names) -> Kept {
+fn own(opcode: u8, body: &[u8], channels: Channels, (names, before): (&Names, Option<&[BodyRow]>)) -> Kept {
     let record = match mcap_record::parse(opcode, body) {
         Ok(record) => record,
         Err(error) => return Kept::Damage(error),
     };
     match record {
         McapRecord::Message { channel, data } if Some(channel) == channels.tick => {
-            Kept::Row(Box::new(tick::read(data, names)))
+            Kept::Row(Box::new(tick::read(data, names, before)))
         }
         McapRecord::Message { channel, data } if Some(channel) == channels.orders => {
             Kept::Order(read_order(data))
