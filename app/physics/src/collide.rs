@@ -53,6 +53,7 @@ mod mesh_share;
 mod mesh_solid;
 mod mesh_span;
 mod mesh_spread;
+mod mesh_springs;
 mod overlay;
 mod rim;
 mod ring;
@@ -147,8 +148,10 @@ pub struct PairMemory {
     pub words: [f64; 8],
     /// Of a mesh, where it touches.
     pub patches: Patches,
-    /// Points are so soft that energy in them can be felt: of a mesh on a plane all vertices count.
+    /// Points are so soft that energy in them can be felt: of a mesh all vertices count.
     pub is_soft: bool,
+    /// B never moves: vertices of a fixed mesh do not count where a closed form touches it.
+    pub is_b_fixed: bool,
 }
 
 /// The vertices that a mesh stands on, and how it stood when they were chosen.

@@ -145,6 +145,7 @@ impl Pair {
         self.remembers = true;
         let (in_A, in_B) = (Solid { shape: &a.shape, X_W: &a.X_WB }, Solid { shape: &b.shape, X_W: &b.X_WB });
         self.memory.is_soft = self.surfacing.is_as_felt() && start.is_implicit;
+        self.memory.is_b_fixed = self.bodies.1.is_none();
         let mut found = ContactPoints::default();
         contact_points(in_A, in_B, reach_m, &mut self.memory, &mut found);
         if rows.len() > *most_rows / 2 {

@@ -185,10 +185,20 @@ impl About {
             Self::Edge(face, edge) => (face * 3 + edge as u32) << 2 | 1,
             Self::Vertex(vertex) => vertex << 2 | 2,
             Self::Other(point) => point << 2 | 3,
-            Self::Both => ((1 << 27) - 1) << 2 | 3,
-            Self::Region(face) => ((1 << 27) - 2 - face) << 2 | 3,
+            Self::Both => (MOST_NUMBERS - 1) << 2 | 3,
+            Self::Region(face) => (MOST_NUMBERS - 2 - face) << 2 | 3,
             // No ball has any.
             Self::Cut { edge, of_mesh, place } => (edge << 3 | u32::from(of_mesh) << 2 | place) << 2 | 1,
+        }
+    }
+
+    /// The vertex of the mesh or the point of the other one that has this name.
+    pub(super) fn point(id: u32) -> Option<Self> {
+        let number = id >> 2;
+        match id & 3 {
+            2 => Some(Self::Vertex(number)),
+            3 => Some(Self::Other(number)),
+            _ => None,
         }
     }
 
@@ -199,3 +209,6 @@ impl About {
         }
     }
 }
+
+/// Numbers have 27 bits.
+const MOST_NUMBERS: u32 = 1 << 27;

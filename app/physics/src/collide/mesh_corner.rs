@@ -63,6 +63,23 @@ impl Corner {
         !is_closed
     }
 
+    /// What [`Self::sticks_out`] asks, of one edge: if it does, one of the faces around it says so.
+    pub(super) fn sticks_out_here(self, mesh: &Mesh) -> bool {
+        let (face, corner) = (&mesh.faces()[(self.0 / 3) as usize], (self.0 % 3) as usize);
+        let link = face.links[corner];
+        link.is_boundary() || link.is_turned() || bends(mesh, face, corner)
+    }
+
+    /// What [`Self::is_in_a_plane`] denies, of one edge: if it is not, one of the faces around it says so.
+    pub(super) fn is_bent_here(self, mesh: &Mesh) -> bool {
+        let (face, corner) = (&mesh.faces()[(self.0 / 3) as usize], (self.0 % 3) as usize);
+        let link = face.links[corner];
+        link.is_boundary() || {
+            let beyond = &mesh.faces()[link.face() as usize];
+            (face.normal_B - beyond.normal_B).norm_squared() > FLAT * FLAT
+        }
+    }
+
     /// Visits the faces around it, of many the first.
     pub(super) fn for_each_face(self, mesh: &Mesh, mut visit: impl FnMut(&Face)) {
         let mut fan = Fan::new(mesh, self.0 / 3, (self.0 % 3) as usize);

@@ -169,6 +169,11 @@ impl Found {
     }
 }
 
+/// The place that a contact is of, and what it is called there.
+pub(super) fn place_and_name(id: u32) -> (usize, u32) {
+    ((id >> PATCH_SHIFT) as usize, id & NAMES)
+}
+
 /// Room for vertices, points of the other one and crossings of one place, beside what the others have kept.
 const ROOM: usize = (2 + MAX_PATCHES) * PATCH_POINTS;
 /// Points of several places that are nearer share their depth \[m\].

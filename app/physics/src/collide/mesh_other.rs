@@ -235,20 +235,31 @@ impl Other<'_> {
         match self.solid {
             Solidity::Form(form) => owns_of_form(form, &self.X_MO, &way_M),
             Solidity::Mesh(mesh) => {
-                let height = Linear::from(&meeting.at_M, meeting.normal_M);
                 let mut limits = [Linear::ONE; 5];
-                for (limit, of_mesh) in limits.iter_mut().zip(of_mesh) {
-                    *limit = seen_from(of_mesh, &self.X_MO);
-                }
-                let standing = Standing {
-                    mesh,
-                    height: seen_from(&height, &self.X_MO),
-                    limits: &limits[..of_mesh.len()],
-                    reach_m: meeting.reach_m,
-                    travel_m: meeting.travel_m,
-                };
+                let standing = self.standing(mesh, meeting, of_mesh, &mut limits);
                 standing.choose(memory).map(|corner| corner.map(|corner| self.own_vertex(mesh, corner)))
             }
+        }
+    }
+
+    /// The other mesh over the place, within limits that hold in M.
+    pub(super) fn standing<'l>(
+        &self,
+        second: &'l Mesh,
+        meeting: &Meeting,
+        of_mesh: &[Linear],
+        limits: &'l mut [Linear; 5],
+    ) -> Standing<'l> {
+        let height = Linear::from(&meeting.at_M, meeting.normal_M);
+        for (limit, of_mesh) in limits.iter_mut().zip(of_mesh) {
+            *limit = seen_from(of_mesh, &self.X_MO);
+        }
+        Standing {
+            mesh: second,
+            height: seen_from(&height, &self.X_MO),
+            limits: &limits[..of_mesh.len()],
+            reach_m: meeting.reach_m,
+            travel_m: meeting.travel_m,
         }
     }
 
@@ -277,7 +288,7 @@ impl Other<'_> {
         }
     }
 
-    fn own_vertex(&self, mesh: &Mesh, corner: Corner) -> Own {
+    pub(super) fn own_vertex(&self, mesh: &Mesh, corner: Corner) -> Own {
         let at_M = (self.X_MO * Point3::from(*corner.point_M(mesh))).coords;
         Own { number: corner.vertex(mesh), at_M, radius_m: 0.0, corner: Some(corner) }
     }

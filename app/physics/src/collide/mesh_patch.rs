@@ -86,6 +86,19 @@ impl Patches {
         self.all.iter().enumerate().any(|(at, patch)| at != number && patch.is_pressed())
     }
 
+    /// The first place with all others as one, as if nobody knew of them. `None`: one is neither in its plane, nor looks as it
+    /// does and presses nothing.
+    pub(super) fn as_one(&self) -> Option<Self> {
+        let (first, mut one) = (&self.all[0], *self);
+        for patch in one.all[1..].iter_mut().filter(|patch| patch.is_known) {
+            if !first.is_same(&patch.normal_M, &patch.at_M, !patch.is_pressed()) {
+                return None;
+            }
+            patch.is_known = false;
+        }
+        first.is_known.then_some(one)
+    }
+
     /// Whether a normal is another place's rather than this one's.
     pub(super) fn belongs_elsewhere(&self, number: usize, normal_M: &Vector3<f64>) -> bool {
         let agrees = self.all[number].normal_M.dot(normal_M);

@@ -7,8 +7,10 @@ use haptics::{Form, Shape};
 use nalgebra::{Isometry3, Vector3};
 
 use super::mesh::{About, Contact, Told, bounding_ball};
+use super::mesh_corner::Corner;
 use super::mesh_span::Standing;
-use super::{PairMemory, mesh_spread};
+use super::mesh_spread::Lows;
+use super::{MAX_POINTS, PairMemory, mesh_spread};
 
 /// The plane that such a mesh can only stand on, in the other one's frame: that of a plane, or, where contacts are soft, of a box's
 /// face that it is over with all that it has.
@@ -51,7 +53,14 @@ pub(super) fn contact_points(
         travel_m: (reach_m - crate::pair::REACH_M).max(0.0),
     };
     let spread = &mut memory.patches.spread;
-    if memory.is_soft && mesh_spread::tell(&standing, &-normal_M, spread, |contact| told.tell(contact)) {
+    let find = |lows: &mut Lows| {
+        let see = |corner: Corner| {
+            let about = About::Vertex(corner.vertex(mesh));
+            Some(Contact::new(about, *corner.point_M(mesh), -normal_M, standing.height_m(corner)))
+        };
+        lows.find(&standing, |_| true, see)
+    };
+    if memory.is_soft && mesh_spread::tell(spread, MAX_POINTS, find, |contact| told.tell(contact)) {
         return;
     }
     for corner in standing.choose(&mut memory.patches.all[0].stands[0]).into_iter().flatten() {

@@ -81,7 +81,19 @@ pub(super) fn contact_points(
     if let (None, Solidity::Mesh(second)) = (&touch, other.solid) {
         mesh_overlap::part(mesh, second, &other.X_MO, &mut found);
     }
-    found.all().iter().for_each(|contact| told.tell(contact));
+    let stands = told.mesh_is_a || !memory.is_b_fixed || matches!(other.solid, Solidity::Mesh(_));
+    let (is_soft, mut spread) = (memory.is_soft && stands, patches.spread);
+    spread.set_crowded(is_soft);
+    let one = if is_soft { patches.as_one() } else { None };
+    let is_told = one.is_some_and(|one| {
+        let meeting = Meeting::of(&one.all[0], reach_m, travel_m);
+        let place = Place { mesh, other, meeting, number: 0, patches: &one, touch: touch.as_ref() };
+        place.tell_springs(found.all(), &mut spread, told)
+    });
+    if !is_told {
+        found.all().iter().for_each(|contact| told.tell(contact));
+    }
+    patches.spread = spread;
     patches.all.iter_mut().enumerate().for_each(|(number, patch)| patch.carried = found.carried(number));
     patches.put_a_pressed_one_first();
 }
@@ -100,10 +112,10 @@ fn find(
         if patches.all[number].is_known {
             let meeting = Meeting::of(&patches.all[number], reach_m, travel_m);
             let mut stands = patches.all[number].stands;
-            let mut place = Place { mesh, other, meeting, number, patches, touch, found: &mut found };
-            place.vertices(&mut stands[0]);
-            place.owns(&mut stands[1]);
-            place.touch();
+            let place = Place { mesh, other, meeting, number, patches, touch };
+            place.vertices(&mut stands[0], &mut found);
+            place.owns(&mut stands[1], &mut found);
+            place.touch(&mut found);
             patches.all[number].stands = stands;
             let are_several = patches.are_several();
             patches.all[number].remember(found.end(&meeting.normal_M, are_several));
@@ -188,40 +200,56 @@ impl Patch {
 }
 
 /// A place whose contact points are being found.
-struct Place<'m> {
-    mesh: &'m Mesh,
-    other: &'m Other<'m>,
-    meeting: Meeting,
+pub(super) struct Place<'m> {
+    pub(super) mesh: &'m Mesh,
+    pub(super) other: &'m Other<'m>,
+    pub(super) meeting: Meeting,
     number: usize,
-    patches: &'m Patches,
+    pub(super) patches: &'m Patches,
     touch: Option<&'m Touch>,
-    found: &'m mut Found,
 }
 
 impl Place<'_> {
     /// The mesh's vertices against the other one.
-    fn vertices(&mut self, stands: &mut super::Stands) {
+    fn vertices(&self, stands: &mut super::Stands, found: &mut Found) {
+        let (height, limits) = self.limits_of_mesh(self.beside_m(self.mesh));
+        let limits = self.limits(self.mesh, &limits);
+        let chosen = self.standing(height, limits).choose(stands);
+        for contact in chosen.into_iter().flatten().filter_map(|corner| self.contact_of_vertex(corner)) {
+            self.push(contact, found);
+        }
+        chosen.into_iter().flatten().for_each(|corner| self.edges_of_mesh(corner, found));
+    }
+
+    /// Height of the mesh's vertices over the other one, and limits of what may touch or is so far beside that (m).
+    pub(super) fn limits_of_mesh(&self, beside_m: f64) -> (Linear, [Linear; 5]) {
         let (mesh, other, meeting) = (self.mesh, self.other, self.meeting);
         let n = meeting.normal_M;
         let height = Linear::from(&other.front(&-n, &meeting, mesh.extent_m()), -n);
-        let limits = meeting.limits(&other.extent(), self.beside_m(mesh), &height, self.behind_m());
-        let limits = self.limits(mesh, &limits);
-        let Meeting { reach_m, travel_m, .. } = meeting;
-        let chosen = Standing { mesh, height, limits, reach_m, travel_m }.choose(stands);
-        let is_mesh = matches!(other.solid, Solidity::Mesh(_));
-        let counts = |corner: &Corner| match is_mesh {
-            true => corner.sticks_out(mesh),
-            false => !corner.is_in_a_plane(mesh),
+        (height, meeting.limits(&other.extent(), beside_m, &height, self.behind_m()))
+    }
+
+    /// The mesh over the other one.
+    pub(super) fn standing<'l>(&'l self, height: Linear, limits: &'l [Linear]) -> Standing<'l> {
+        let Meeting { reach_m, travel_m, .. } = self.meeting;
+        Standing { mesh: self.mesh, height, limits, reach_m, travel_m }
+    }
+
+    /// A vertex of the mesh, if it is one that counts.
+    pub(super) fn contact_of_vertex(&self, corner: Corner) -> Option<Contact> {
+        let mesh = self.mesh;
+        let counts = match self.other.solid {
+            Solidity::Mesh(_) => corner.sticks_out(mesh),
+            Solidity::Form(_) => !corner.is_in_a_plane(mesh),
         };
-        for corner in chosen.into_iter().flatten().filter(counts) {
-            let on_mesh_M = *corner.point_M(mesh);
-            let Some(seen) = self.of_vertex(&on_mesh_M) else { continue };
-            if !self.patches.are_several() || corner.looks(mesh, &-seen.out) {
-                let about = About::Vertex(corner.vertex(mesh));
-                self.push(Contact::new(about, on_mesh_M, -seen.out, seen.gap_m));
-            }
+        if !counts {
+            return None;
         }
-        chosen.into_iter().flatten().for_each(|corner| self.edges_of_mesh(corner));
+        let on_mesh_M = *corner.point_M(mesh);
+        let seen = self.of_vertex(&on_mesh_M)?;
+        let looks = !self.patches.are_several() || corner.looks(mesh, &-seen.out);
+        let about = About::Vertex(corner.vertex(mesh));
+        looks.then(|| Contact::new(about, on_mesh_M, -seen.out, seen.gap_m))
     }
 
     /// Of one place among several, what lies behind it does not count; but what lies beside it does, where that is the end
@@ -292,60 +320,63 @@ impl Place<'_> {
     }
 
     /// The other one's points against the mesh.
-    fn owns(&mut self, stands: &mut super::Stands) {
-        let (mesh, other, meeting) = (self.mesh, self.other, self.meeting);
-        let height = Linear::from(&meeting.at_M, meeting.normal_M);
-        let beside_m = if let Solidity::Mesh(second) = other.solid { self.beside_m(second) } else { 0.0 };
-        let extent = Extent::of(mesh.bounds_B(), &Isometry3::identity());
-        let limits = meeting.limits(&extent, beside_m, &height, self.behind_m());
-        let limits = match other.solid {
-            Solidity::Mesh(second) => self.limits(second, &limits),
-            Solidity::Form(_) => &limits,
-        };
-        let owns = other.owns(&meeting, limits, stands);
-        let far_m = meeting.reach_m + FAR * meeting.depth_m;
-        for own in owns.into_iter().flatten() {
-            if !other.sticks_out(&own) {
-                continue;
-            }
-            // Far from all faces it is outside, or so deep inside that it does not matter where others press.
-            if mesh.clearance(&own.at_M, own.radius_m + far_m) >= own.radius_m + far_m {
-                continue;
-            }
-            let Some(seen) = self.of_own(&own) else { continue };
-            if self.patches.are_several() && !other.looks(&own, &-seen.out) {
-                continue;
-            }
-            let on_mesh_M = own.at_M - seen.out * seen.gap_m;
-            let about = About::Other(own.number);
-            self.push(Contact::new(about, on_mesh_M, seen.out, seen.gap_m - own.radius_m));
+    fn owns(&self, stands: &mut super::Stands, found: &mut Found) {
+        let second = if let Solidity::Mesh(second) = self.other.solid { Some(second) } else { None };
+        let limits = self.limits_of_other(second.map_or(0.0, |second| self.beside_m(second)));
+        let limits = second.map_or(&limits[..], |second| self.limits(second, &limits));
+        let owns = self.other.owns(&self.meeting, limits, stands);
+        for contact in owns.iter().flatten().filter_map(|own| self.contact_of_own(own)) {
+            self.push(contact, found);
         }
-        self.edges();
+        self.edges(found);
         let corners = owns.into_iter().flatten().filter_map(|own| own.corner);
-        corners.for_each(|corner| self.edges_of_other(corner));
+        corners.for_each(|corner| self.edges_of_other(corner, found));
+    }
+
+    /// Limits of what of the other one may touch, or is so far beside that (m).
+    pub(super) fn limits_of_other(&self, beside_m: f64) -> [Linear; 5] {
+        let height = Linear::from(&self.meeting.at_M, self.meeting.normal_M);
+        let extent = Extent::of(self.mesh.bounds_B(), &Isometry3::identity());
+        self.meeting.limits(&extent, beside_m, &height, self.behind_m())
+    }
+
+    /// A point of the other one, if it is one that counts.
+    pub(super) fn contact_of_own(&self, own: &Own) -> Option<Contact> {
+        let (mesh, other, meeting) = (self.mesh, self.other, self.meeting);
+        let far_m = own.radius_m + meeting.reach_m + FAR * meeting.depth_m;
+        // Far from all faces it is outside, or so deep inside that it does not matter where others press.
+        if !other.sticks_out(own) || mesh.clearance(&own.at_M, far_m) >= far_m {
+            return None;
+        }
+        let seen = self.of_own(own)?;
+        let looks = !self.patches.are_several() || other.looks(own, &-seen.out);
+        let on_mesh_M = own.at_M - seen.out * seen.gap_m;
+        let about = About::Other(own.number);
+        looks.then(|| Contact::new(about, on_mesh_M, seen.out, seen.gap_m - own.radius_m))
     }
 
     /// Where edges of a form are cut off by the mesh.
-    fn edges(&mut self) {
+    fn edges(&self, found: &mut Found) {
         let n = self.meeting.normal_M;
         for (number, edge) in self.other.edges(&-n).into_iter().flatten().enumerate() {
-            self.cuts_by_mesh(&edge, About::Cut { edge: number as u32, of_mesh: false, place: 0 });
+            let about = About::Cut { edge: number as u32, of_mesh: false, place: 0 };
+            self.cuts_by_mesh(&edge, about, found);
         }
     }
 
     /// Where edges that leave a vertex of the other mesh are cut off by this one.
-    fn edges_of_other(&mut self, corner: Corner) {
+    fn edges_of_other(&self, corner: Corner, found: &mut Found) {
         let Solidity::Mesh(second) = self.other.solid else { return };
         let X_MO = self.other.X_MO;
         let place = |point: &Vector3<f64>| (X_MO * Point3::from(*point)).coords;
         let from = place(corner.point_M(second));
         corner.for_each_edge(second, |to, face, edge| {
             let about = About::Cut { edge: 3 * face + edge as u32, of_mesh: false, place: 0 };
-            self.cuts_by_mesh(&Edge { ends: [from, place(to)] }, about);
+            self.cuts_by_mesh(&Edge { ends: [from, place(to)] }, about, found);
         });
     }
 
-    fn cuts_by_mesh(&mut self, edge: &Edge, about: About) {
+    fn cuts_by_mesh(&self, edge: &Edge, about: About, found: &mut Found) {
         let lift = |point_M: &Vector3<f64>| self.lift_M(point_M, 1.0);
         let way = WayOut {
             along: self.meeting.normal_M,
@@ -357,13 +388,13 @@ impl Place<'_> {
         for (at, cut) in cuts.into_iter().enumerate() {
             if let Some(cut) = cut {
                 let about = about.at_place(at as u32);
-                self.push(Contact::new(about, cut.on_mesh, cut.out, cut.gap_m));
+                self.push(Contact::new(about, cut.on_mesh, cut.out, cut.gap_m), found);
             }
         }
     }
 
     /// Where edges that leave a vertex of this mesh are cut off by the other one.
-    fn edges_of_mesh(&mut self, corner: Corner) {
+    fn edges_of_mesh(&self, corner: Corner, found: &mut Found) {
         let (mesh, meeting, X_MO) = (self.mesh, self.meeting, self.other.X_MO);
         let Solidity::Mesh(second) = self.other.solid else { return };
         let place = |point: &Vector3<f64>| X_MO.inverse_transform_point(&Point3::from(*point)).coords;
@@ -381,35 +412,37 @@ impl Place<'_> {
                 let about = About::Cut { edge: 3 * face + edge as u32, of_mesh: true, place: at as u32 };
                 if let Some(cut) = cut {
                     let on_mesh_M = (X_MO * Point3::from(cut.on_edge)).coords;
-                    self.push(Contact::new(about, on_mesh_M, -(X_MO * cut.out), cut.gap_m));
+                    self.push(Contact::new(about, on_mesh_M, -(X_MO * cut.out), cut.gap_m), found);
                 }
             }
         });
     }
 
     /// The place at which two convex ones touch, if nothing else presses there.
-    fn touch(&mut self) {
-        let contact = self.touch.and_then(|touch| touch.unless_found(self.found.own()));
-        contact.into_iter().for_each(|contact| self.found.push_apart(contact));
+    fn touch(&self, found: &mut Found) {
+        let contact = self.touch.and_then(|touch| touch.unless_found(found.own()));
+        contact.into_iter().for_each(|contact| found.push_apart(contact));
     }
 
-    /// Points of another place that one finds. A corner that is beside a single place by next to nothing would take the room of
-    /// one that is on it.
-    fn push(&mut self, contact: Contact) {
-        if let Some(touch) = self.touch {
-            if contact.gap_m <= self.meeting.reach_m && touch.counts(&contact) {
-                self.found.push(contact);
-            }
-            return;
+    fn push(&self, contact: Contact, found: &mut Found) {
+        if self.is_here(&contact) {
+            found.push(contact);
         }
-        let is_near = contact.gap_m <= self.meeting.reach_m;
+    }
+
+    /// True of what is not a point of another place that one finds. A corner that is beside a single place by next to nothing would
+    /// take the room of one that is on it.
+    pub(super) fn is_here(&self, contact: &Contact) -> bool {
+        if contact.gap_m > self.meeting.reach_m {
+            return false;
+        }
+        if let Some(touch) = self.touch {
+            return touch.counts(contact);
+        }
         let is_single = self.meeting.depth_m > 0.0 && self.patches.is_alone(self.number);
         let is_beside =
             is_single && contact.gap_m >= 0.0 && contact.normal_M.dot(&self.meeting.normal_M) < BESIDE;
-        if !is_near || is_beside || self.patches.belongs_elsewhere(self.number, &contact.normal_M) {
-            return;
-        }
-        self.found.push(contact);
+        !is_beside && !self.patches.belongs_elsewhere(self.number, &contact.normal_M)
     }
 }
 

@@ -15,14 +15,14 @@
 use nalgebra::Vector3;
 
 use super::MAX_POINTS;
-use super::mesh::{About, Contact};
+use super::mesh::Contact;
 use super::mesh_corner::Corner;
 use super::mesh_span::Standing;
 
 /// Memory from tick to tick.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub(crate) struct Spread {
-    /// Vertices that were chosen, plus one; 0: none.
+    /// Names of the contacts of vertices that were chosen; 0: none.
     chosen: [u32; MAX_POINTS],
     /// Number of times that every second one was left out.
     halvings: u32,
@@ -37,65 +37,70 @@ impl Spread {
     pub(crate) fn is_crowded(&self) -> bool {
         self.is_crowded
     }
+
+    /// Takes note that others than vertices touch, too, or that a few vertices stand for all.
+    pub(super) fn set_crowded(&mut self, is_crowded: bool) {
+        self.is_crowded = is_crowded;
+    }
 }
 
-/// A vertex within reach.
+/// A vertex within reach, as what it touches sees it.
 #[derive(Debug, Clone, Copy, Default)]
 struct Low {
-    number: u32,
-    at_M: Vector3<f64>,
-    gap_m: f64,
+    contact: Contact,
     /// Nearest of those that were chosen, and the distance to it, squared \[m^2\].
     group: usize,
     apart_m2: f64,
 }
 
 /// Vertices within reach, and which of them were chosen.
-struct Lows {
+pub(super) struct Lows {
     all: [Low; MOST_VERTICES],
     count: usize,
     chosen: [u32; MAX_POINTS],
     groups: usize,
+    /// How often every second one is left out.
+    halvings: u32,
 }
 
-/// Tells contact points for all vertices within reach of what they stand on, which is `normal_M` from them; `false`: they are too
-/// many, and none is told.
+/// Tells no more contact points than there is room for, for all vertices that `find` finds; `false`: they are too many, and none
+/// is told.
 pub(super) fn tell(
-    standing: &Standing<'_>,
-    normal_M: &Vector3<f64>,
     memory: &mut Spread,
+    room: usize,
+    find: impl Fn(&mut Lows) -> bool,
     mut tell: impl FnMut(&Contact),
 ) -> bool {
     if memory.waits > 0 {
         memory.waits -= 1;
         return false;
     }
-    let mut lows =
-        Lows { all: [Low::default(); MOST_VERTICES], count: 0, chosen: [0; MAX_POINTS], groups: 0 };
-    while !lows.find(standing, memory.halvings) {
-        if memory.halvings == MOST_HALVINGS {
-            (memory.is_crowded, memory.waits) = (true, WAITS);
+    let mut lows = Lows {
+        all: [Low::default(); MOST_VERTICES],
+        count: 0,
+        chosen: [0; MAX_POINTS],
+        groups: 0,
+        halvings: memory.halvings,
+    };
+    while !find(&mut lows) {
+        if lows.halvings == MOST_HALVINGS {
+            (memory.halvings, memory.is_crowded, memory.waits) = (MOST_HALVINGS, true, WAITS);
             return false;
         }
-        memory.halvings += 1;
+        (lows.count, lows.halvings) = (0, lows.halvings + 1);
     }
+    // Where there are few, more count from the next tick on.
+    let are_few = lows.count < FEW_VERTICES;
+    memory.halvings = lows.halvings.saturating_sub(u32::from(are_few));
     memory.is_crowded = false;
-    if lows.count < FEW_VERTICES {
-        // From the next tick on.
-        memory.halvings = memory.halvings.saturating_sub(1);
-    }
-    if lows.count <= MAX_POINTS {
-        for low in &lows.all[..lows.count] {
-            tell(&Contact::new(About::Vertex(low.number), low.at_M, *normal_M, low.gap_m));
-        }
+    if lows.count <= room {
+        lows.all[..lows.count].iter().for_each(|low| tell(&low.contact));
         memory.chosen = lows.chosen;
         return true;
     }
-    lows.choose(&memory.chosen);
+    lows.choose(&memory.chosen, room);
     memory.chosen = lows.chosen;
-    for group in 0..lows.groups {
-        tell(&lows.contact(group, normal_M));
-    }
+    (0..lows.groups).for_each(|group| tell(&lows.contact(group)));
     true
 }
 
@@ -129,37 +134,44 @@ impl Seen {
 }
 
 impl Lows {
-    /// Finds all within reach that count; `false`: there is no room for them.
-    fn find(&mut self, standing: &Standing<'_>, halvings: u32) -> bool {
+    /// Adds all of a mesh within reach of which a corner counts, as `see` sees them; `false`: there is no room for them.
+    pub(super) fn find(
+        &mut self,
+        standing: &Standing<'_>,
+        counts: impl Fn(Corner) -> bool,
+        mut see: impl FnMut(Corner) -> Option<Contact>,
+    ) -> bool {
         let mesh = standing.mesh;
-        self.count = 0;
-        let (all, count) = (&mut self.all, &mut self.count);
-        let mut seen = Seen { names: [0; SEEN] };
-        let see = |corner: Corner| {
-            let (number, at_M) = (corner.vertex(mesh), *corner.point_M(mesh));
-            if !scattered(number).is_multiple_of(1 << halvings) || !seen.is_new(number) {
+        let (all, count, halvings) = (&mut self.all, &mut self.count, self.halvings);
+        let (mut seen, mut looks) = (Seen { names: [0; SEEN] }, 0);
+        let add = |corner: Corner| {
+            let number = corner.vertex(mesh);
+            let is_left_out = !scattered(number).is_multiple_of(1 << halvings);
+            if is_left_out || !counts(corner) || !seen.is_new(number) {
                 return true;
             }
+            looks += 1;
+            let Some(contact) = see(corner) else { return looks < MOST_LOOKS };
             let Some(place) = all.get_mut(*count) else { return false };
-            let gap_m = standing.height_m(corner);
-            *place = Low { number, at_M, gap_m, group: 0, apart_m2: f64::INFINITY };
+            *place = Low { contact, group: 0, apart_m2: f64::INFINITY };
             *count += 1;
             true
         };
-        standing.for_each_low(see, MOST_VISITS)
+        standing.for_each_low(add, MOST_VISITS)
     }
 
     /// Chooses those of the last tick that are there, and then the one that is farthest from all that are chosen, again and again.
-    fn choose(&mut self, last: &[u32; MAX_POINTS]) {
+    fn choose(&mut self, last: &[u32; MAX_POINTS], room: usize) {
         for &name in last.iter().filter(|&&name| name != 0) {
-            if let Some(at) = self.all[..self.count].iter().position(|low| low.number + 1 == name) {
+            let place = self.all[..self.count].iter().position(|low| low.contact.id == name);
+            if let Some(at) = place.filter(|_| self.groups < room) {
                 self.take(at);
             }
         }
         if self.groups == 0 {
             self.take(0);
         }
-        while self.groups < MAX_POINTS {
+        while self.groups < room {
             let apart = |at: &usize| self.all[*at].apart_m2;
             let farthest = (0..self.count).max_by(|a, b| apart(a).total_cmp(&apart(b)));
             let Some(farthest) = farthest.filter(|at| apart(at) > 0.0) else { break };
@@ -169,11 +181,11 @@ impl Lows {
 
     fn take(&mut self, at: usize) {
         let group = self.groups;
-        let Low { number, at_M, .. } = self.all[at];
-        self.chosen[group] = number + 1;
+        let Contact { id, on_mesh_M, .. } = self.all[at].contact;
+        self.chosen[group] = id;
         self.groups += 1;
         for low in &mut self.all[..self.count] {
-            let apart_m2 = (low.at_M - at_M).norm_squared();
+            let apart_m2 = (low.contact.on_mesh_M - on_mesh_M).norm_squared();
             if apart_m2 < low.apart_m2 {
                 (low.group, low.apart_m2) = (group, apart_m2);
             }
@@ -181,25 +193,28 @@ impl Lows {
     }
 
     /// The contact point of a group: where nothing of it touches, the lowest.
-    fn contact(&self, group: usize, normal_M: &Vector3<f64>) -> Contact {
-        let own = || self.all[..self.count].iter().filter(|low| low.group == group);
-        let (mut deep_m, mut deep_m2, mut at_M) = (0.0, 0.0, Vector3::zeros());
+    fn contact(&self, group: usize) -> Contact {
+        let own = || self.all[..self.count].iter().filter(|low| low.group == group).map(|low| &low.contact);
+        let (mut deep_m, mut deep_m2) = (0.0, 0.0);
+        let (mut at_M, mut normal_M) = (Vector3::zeros(), Vector3::zeros());
         for low in own().filter(|low| low.gap_m < 0.0) {
             deep_m -= low.gap_m;
             deep_m2 += low.gap_m * low.gap_m;
-            at_M -= low.at_M * low.gap_m;
+            at_M -= low.on_mesh_M * low.gap_m;
+            normal_M -= low.normal_M * low.gap_m;
         }
-        let about = About::Vertex(self.chosen[group] - 1);
-        if deep_m2 == 0.0 {
+        let force_m = normal_M.norm();
+        let id = self.chosen[group];
+        if deep_m2 == 0.0 || force_m < LEAST_FORCE * deep_m {
             let lowest = own().min_by(|a, b| a.gap_m.total_cmp(&b.gap_m));
             // A chosen one is its group's.
-            let low = lowest.copied().unwrap_or_default();
-            return Contact::new(about, low.at_M, *normal_M, low.gap_m);
+            return Contact { id, ..lowest.copied().unwrap_or_default() };
         }
         // So the springs' force is the sum of all, and so is what they hold.
-        let share = deep_m * deep_m / deep_m2;
-        let contact = Contact::new(about, at_M / deep_m, *normal_M, -deep_m2 / deep_m);
-        Contact { gap_m: -deep_m, share, ..contact }
+        let (on_mesh_M, normal_M) = (at_M / deep_m, normal_M / force_m);
+        let on_other_M = on_mesh_M - normal_M * (deep_m2 / force_m);
+        let share = force_m * force_m / deep_m2;
+        Contact { id, on_mesh_M, on_other_M, normal_M, gap_m: -force_m, share, carried: false }
     }
 }
 
@@ -215,5 +230,10 @@ const MOST_HALVINGS: u32 = 4;
 const SEEN: usize = 4 * MOST_VERTICES;
 /// Odd, and nearest to the golden section of all numbers.
 const SCATTER: u32 = 2_654_435_769;
-/// Bound on the nodes of the hierarchy and the runs of faces that are looked at.
+/// Sum of what a group presses, of its parts': less is none, for these press against each other.
+const LEAST_FORCE: f64 = 0.1;
+/// Vertices that are looked at, whether they are within reach or not.
+const MOST_LOOKS: usize = 2 * MOST_VERTICES;
+/// Bound on the nodes of the hierarchy and the runs of faces that are looked at. With four times as many, cans of thousands of sides
+/// stand, and balls of a hundred thousand triangles sway on their facets for longer than half a minute.
 const MOST_VISITS: usize = 2048;
