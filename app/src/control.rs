@@ -120,6 +120,11 @@ impl Control {
         OrderTally { taken: self.taken, undone: self.gradual.undone(), never_reached }
     }
 
+    /// Whether an order is due by this tick of the run that waits for a world.
+    pub fn wants_world(&self, run_tick: u64) -> bool {
+        self.orders.wants_world(run_tick)
+    }
+
     /// Before a tick of this length (s), the run's so many-th.
     pub fn turn(&mut self, step: &mut FastStep, run_tick: u64, dt_s: f64) -> Turned {
         let mut turned = Turned::default();
@@ -137,7 +142,8 @@ impl Control {
                 Order::Tell(kind, at) => {
                     *told = Some(Event { run_tick: at.map_or(run_tick, |at| at.min(run_tick)), kind });
                 }
-                Order::Text => {}
+                // The queue has put a world into its place.
+                Order::Text | Order::ReplaceByNext => {}
                 Order::Replace(next) => self.waiting = Some(Waiting::Replace(next)),
                 Order::Friction(change) => self.waiting = Some(Waiting::Friction(change)),
                 Order::Pause(is_paused) => self.waiting = Some(Waiting::Pause(is_paused)),

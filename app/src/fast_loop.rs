@@ -467,6 +467,11 @@ impl FastLoop {
         self.rows.has_room(self.step.bodies().len(), usize::MAX)
     }
 
+    /// Whether the next tick would bring a world that is not made yet.
+    pub fn wants_world(&self) -> bool {
+        self.control.as_ref().is_some_and(|control| control.wants_world(self.run_ticks() + 1))
+    }
+
     fn push(&mut self, row: Row) {
         if self.when_full == WhenFull::Wait {
             let others = self.displaced.pending().len();

@@ -31,6 +31,9 @@ pub const FIFO_PRIORITY: u8 = 70;
 const SPIN_MARGIN_NS: u64 = 100_000;
 /// How long a sleep on the doorbell lasts without a look at requests to stop.
 const NAP: Duration = Duration::from_millis(20);
+/// A world takes no longer to be made, and is looked for so often.
+const WORLD_NS: u64 = 30_000_000_000;
+const WORLD_LOOK: Duration = Duration::from_millis(1);
 /// A driver that publishes nothing for so long is stopped or gone.
 const SILENCE_NS: u64 = 5_000_000_000;
 /// A look at the doorbell takes no longer where this process runs at all: some naps, and the stalls of a busy machine.
@@ -157,6 +160,7 @@ struct FastThread {
     period_ns: u64,
     margin_ns: u64,
     step_ns: Histogram,
+    is_real: bool,
     seen: Option<u64>,
     /// When the next frame is due, if that is known.
     due_ns: Option<u64>,
@@ -184,6 +188,7 @@ impl FastThread {
             period_ns,
             margin_ns,
             step_ns,
+            is_real: info.clock_mode == ClockMode::Real,
             seen: None,
             due_ns: None,
             plausibility: Plausibility::new(period_ns, info.clock_mode),
@@ -205,8 +210,7 @@ impl FastThread {
             self.outlast_lease();
         }
         // Where the clock waits, waiting is part of a turn.
-        let is_real = self.driver.info().clock_mode == ClockMode::Real;
-        let step_ns = if is_real { self.step_ns } else { self.fast.step_ns.clone() };
+        let step_ns = if self.is_real { self.step_ns } else { self.fast.step_ns.clone() };
         FastRemains { fast: self.fast, driver: self.driver, step_ns, end }
     }
 
@@ -233,6 +237,9 @@ impl FastThread {
         if let Err(lie) = self.judge(tick, is_read, begun) {
             return Some(FastEnd::Implausible(lie));
         }
+        if !self.is_real {
+            self.wait_for_world();
+        }
         let turn = if is_read { self.fast.answer_read(&self.driver, &self.commander) } else { Turn::Unread };
         self.due_ns = Some(self.fast.frame().deadline_ns.saturating_add(self.period_ns));
         match turn {
@@ -244,6 +251,16 @@ impl FastThread {
             Turn::Skipped | Turn::Unread => None,
             Turn::Finished => Some(FastEnd::Finished),
             Turn::Fault(reason) => Some(FastEnd::Fault(reason)),
+        }
+    }
+
+    /// Where the clock waits, a script's world that is due is made first; one that cannot be made never comes.
+    fn wait_for_world(&self) {
+        let begin_ns = monotonic_ns();
+        let is_over =
+            || self.shared.stop.load(Ordering::Relaxed) || self.shared.signals.requested().is_some();
+        while self.fast.wants_world() && !is_over() && monotonic_ns() - begin_ns < WORLD_NS {
+            std::thread::sleep(WORLD_LOOK);
         }
     }
 

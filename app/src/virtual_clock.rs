@@ -80,7 +80,8 @@ impl VirtualDriver {
         for tick in 1.. {
             let turn = self.tick(tick, fast);
             // The same thread fills the queue and empties it: of many things few rows fit in.
-            if !fast.has_room() {
+            // What a script brings is made there, too.
+            if !fast.has_room() || fast.wants_world() {
                 slow.step();
             }
             if tick % SLOW_EVERY == 0 {

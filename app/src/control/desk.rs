@@ -1,6 +1,7 @@
 //! The slow side of orders: reads them, checks them against the scene that will run then, makes what they need, sends them.
 //!
-//! Model: a script is sent as a whole before the run begins, each order with its tick: so it plays the same on every clock.
+//! Model: a script is sent as a whole before the run begins, each order with its tick: so it plays the same on every clock. Only
+//! the worlds that it brings are made one after the other: two are there before their time, and clocks that can wait wait for them.
 //! The standard input is read by a thread of its own; its orders are for the next tick.
 
 use super::gradual::MOST_TIMES;
@@ -22,6 +23,7 @@ use rt_core::input_file;
 use std::collections::VecDeque;
 use std::io::{BufRead, BufReader};
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 use std::sync::mpsc::{self, Receiver, Sender};
 use world::lists::SlowList;
 use world::{FrictionSpec, Layout, Settings};
@@ -36,11 +38,9 @@ pub enum OrderSource {
 }
 
 /// The most orders of a script; and the most replaced worlds that are kept until the slow side frees them.
-const MOST_ORDERS: usize = 1024;
+const MOST_ORDERS: usize = 16_384;
 /// Room for as many orders as wait, each with a long text.
 const MAX_ORDERS_BYTES: u64 = 16 << 20;
-/// The most worlds of a script: all are made before it begins.
-const MOST_WORLDS: usize = 32;
 /// A longer line of the standard input is no text: none is looked for behind it. An order has
 /// [`LONGEST_LINE_BYTES`](words::LONGEST_LINE_BYTES) at most.
 const MOST_LINE_BYTES: usize = 64 << 10;
@@ -91,7 +91,20 @@ pub struct Desk {
     can_move: Vec<bool>,
     lines: Option<Receiver<String>>,
     coming: VecDeque<Coming>,
+    /// Worlds that are made when there is room for them.
+    later: VecDeque<Later>,
+    /// The rig as it is now, once for all worlds to come that have it.
+    shared_rig: Option<Arc<Rig>>,
+    /// Files of the scenes that they bring.
+    inputs: Vec<PathBuf>,
     script: Script,
+}
+
+/// A world that is to be made.
+struct Later {
+    rig: Arc<Rig>,
+    /// It is that of another scene.
+    is_other: bool,
 }
 
 /// What is known of orders that were given for later.
@@ -140,6 +153,9 @@ impl Desk {
             can_move: Vec::new(),
             lines: None,
             coming: VecDeque::new(),
+            later: VecDeque::new(),
+            shared_rig: None,
+            inputs: Vec::new(),
             script: Script::None,
         };
         desk.take_note(&rig.fast_step().map_err(|error| error.to_string())?);
@@ -153,12 +169,13 @@ impl Desk {
 
     /// Files of the scenes that a script will bring.
     pub fn scenes_to_come(&self) -> Vec<PathBuf> {
-        self.coming.iter().flat_map(|coming| coming.rig.input_files()).collect()
+        self.inputs.clone()
     }
 
     /// The slow side's turn: what came in meanwhile. What is refused is told, and the run goes on.
     pub fn step(&mut self) {
         self.sender.free_spent();
+        self.make_worlds();
         let lines: Vec<String> = self.lines.iter().flat_map(Receiver::try_iter).collect();
         for line in lines {
             if let Err(error) = self.order_now(&line) {
@@ -170,21 +187,18 @@ impl Desk {
     fn play(&mut self, file: &Path) -> Result<(), String> {
         let text = input_file::read_text(file, MAX_ORDERS_BYTES)
             .map_err(|error| format!("--orders {}: {error}", file.display()))?;
-        let (mut last_s, mut orders, mut worlds) = (0.0, 0, 0);
+        let (mut last_s, mut orders) = (0.0, 0);
         for (number, line) in (1..).zip(text.lines()) {
             let wrong = |error: String| format!("{}:{number}: {error}", file.display());
             let Some((at_s, order)) = words::split_time(line).map_err(wrong)? else { continue };
             orders += 1;
-            worlds += usize::from(words::makes_a_world(order));
             if at_s < last_s {
                 return Err(wrong(format!(
                     "found at {at_s}, allowed: {last_s} s or later, as the line before it"
                 )));
             }
-            if orders > MOST_ORDERS || worlds > MOST_WORLDS {
-                return Err(wrong(format!(
-                    "too much for a script; allowed: {MOST_ORDERS} orders, and {MOST_WORLDS} of `reset` and `swap`"
-                )));
+            if orders > MOST_ORDERS {
+                return Err(wrong(format!("too much for a script; allowed: {MOST_ORDERS} orders")));
             }
             last_s = at_s;
             let at_tick = self.tick_at(at_s);
@@ -233,16 +247,18 @@ impl Desk {
         if self.sender.is_full(lane) {
             return Err(format!("{MOST_ORDERS} orders wait already"));
         }
-        let order = self.make(words)?;
+        let order = self.make(words, lane)?;
         let number = self.means.book.add_order(words::without_comment(line).trim());
         // There is room.
         self.sender.send(Dated { at_tick, order, number }, lane);
+        self.make_worlds();
         Ok(())
     }
 
-    fn make(&mut self, words: Words) -> Result<Order, String> {
+    fn make(&mut self, words: Words, lane: Lane) -> Result<Order, String> {
         Ok(match words {
-            Words::Reset => Order::Replace(self.world(None)?),
+            Words::Reset if lane == Lane::InTurn => self.replace_later(false),
+            Words::Reset => Order::Replace(self.world(&self.rig, None)?),
             Words::Scale(which, by, entity) => self.scale(which, by, entity.as_deref())?,
             Words::Friction(entity, spec) => self.friction(&entity, spec)?,
             Words::Move(entity, to_W, turn, over_s) => self.move_entity(&entity, to_W, turn, over_s)?,
@@ -250,13 +266,38 @@ impl Desk {
             Words::Pause(is_paused) => Order::Pause(is_paused),
             Words::Tell(kind, at_s) => Order::Tell(kind, at_s.map(|at_s| self.tick_at(at_s))),
             Words::Text(_) => Order::Text,
-            Words::Swap(scene) => self.swap(&scene)?,
+            Words::Swap(scene) => self.swap(&scene, lane)?,
         })
     }
 
-    /// The running scene as it begins; its slow list, if it is somebody's to step, is his.
-    fn world(&self, other: Option<Other>) -> Result<Box<Replacement>, String> {
-        let step = self.rig.fast_step().map_err(|error| error.to_string())?;
+    /// What the running scene is from here on is what a world to come has.
+    fn replace_later(&mut self, is_other: bool) -> Order {
+        let rig = Arc::clone(self.shared_rig.get_or_insert_with(|| Arc::new(self.rig.clone())));
+        self.later.push_back(Later { rig, is_other });
+        Order::ReplaceByNext
+    }
+
+    /// Makes worlds to come as long as there is room for them.
+    fn make_worlds(&mut self) {
+        while self.sender.has_room_for_world()
+            && let Some(Later { rig, is_other }) = self.later.pop_front()
+        {
+            let made = if is_other { self.other_world(&rig) } else { self.world(&rig, None) };
+            match made {
+                Ok(world) => self.sender.send_world(world),
+                Err(error) => {
+                    say(format_args!(
+                        "phantom3: a world of the script cannot be made, and none after it is: {error}"
+                    ));
+                    self.later.clear();
+                }
+            }
+        }
+    }
+
+    /// A scene as it begins; its slow list, if it is somebody's to step, is his.
+    fn world(&self, rig: &Rig, other: Option<Other>) -> Result<Box<Replacement>, String> {
+        let step = rig.fast_step().map_err(|error| error.to_string())?;
         let mut world = Replacement::new(step, other);
         if let Some(slow_lists) = &self.means.slow_lists
             && let Some(slow) = world.step.take_slow()
@@ -271,6 +312,7 @@ impl Desk {
         let number = self.number(entity)?;
         let friction = rig::friction(&spec)?;
         // So a reset keeps it.
+        self.shared_rig = None;
         self.rig.scene.entities[number].friction = spec;
         let for_slow = Some(friction.clone());
         Ok(Order::Friction(Box::new(FrictionChange { entity: number, friction, for_slow })))
@@ -321,11 +363,12 @@ impl Desk {
             "no device goes with the camera; allowed: a run with a --layout that says `attached_to = \"camera\"`",
         )?;
         // So worlds to come have it.
+        self.shared_rig = None;
         *layout = std::mem::take(layout).with_camera(pose);
         Ok(Order::Camera(pose))
     }
 
-    fn swap(&mut self, scene: &Path) -> Result<Order, String> {
+    fn swap(&mut self, scene: &Path, lane: Lane) -> Result<Order, String> {
         let rig = self.rig.beside(scene, &self.means.settings).map_err(|error| error.to_string())?;
         let (needed, has) = (rig.device_count(), self.rig.device_count());
         if needed > has {
@@ -335,25 +378,37 @@ impl Desk {
                 scene.display()
             ));
         }
-        let before = std::mem::replace(&mut self.rig, rig);
-        let bodies = self.rig.names(&self.means.extras).bodies.len();
+        if lane == Lane::Now {
+            let world = self.other_world(&rig)?;
+            self.take_note(&world.step);
+            (self.rig, self.shared_rig) = (rig, None);
+            return Ok(Order::Replace(world));
+        }
+        // What is wrong with it is told now, and what it needs is made later.
+        let step = rig.fast_step().map_err(|error| error.to_string())?;
+        self.take_note(&step);
+        self.inputs.extend(rig.input_files());
+        (self.rig, self.shared_rig) = (rig, None);
+        Ok(self.replace_later(true))
+    }
+
+    /// The world of another scene, and what others get of it.
+    fn other_world(&mut self, rig: &Rig) -> Result<Box<Replacement>, String> {
+        let bodies = rig.names(&self.means.extras).bodies.len();
         let places = BODIES.checked_div(bodies).map_or(ROWS, |places| places.clamp(2, ROWS));
         let (sender, rows) = row_queue_of(places, bodies);
-        let displaced = Displaced::new(self.rig.scene.entities.len());
+        let displaced = Displaced::new(rig.scene.entities.len());
         let other = Other { rows: sender, bodies: Vec::with_capacity(bodies), displaced, number: 0 };
-        let mut world = self.world(Some(other)).inspect_err(|_| self.rig = before.clone())?;
-        let number = self
-            .means
-            .book
-            .add_scene(&self.rig.scene_file.display().to_string(), self.rig.names(&self.means.extras));
+        let mut world = self.world(rig, Some(other))?;
+        let names = rig.names(&self.means.extras);
+        let number = self.means.book.add_scene(&rig.scene_file.display().to_string(), names);
         if let Some(other) = &mut world.other {
             other.number = number;
         }
-        let view = View::new(&self.rig.scene, world.step.entities(), self.means.is_recorded_as_seen);
-        let shown = self.means.is_shown.then(|| Shown::new(&self.rig, world.step.entities()));
-        self.coming.push_back(Coming { rows, rig: self.rig.clone(), view, shown });
-        self.take_note(&world.step);
-        Ok(Order::Replace(world))
+        let view = View::new(&rig.scene, world.step.entities(), self.means.is_recorded_as_seen);
+        let shown = self.means.is_shown.then(|| Shown::new(rig, world.step.entities()));
+        self.coming.push_back(Coming { rows, rig: rig.clone(), view, shown });
+        Ok(world)
     }
 
     /// What is known of the scene that will run.

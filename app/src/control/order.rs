@@ -27,6 +27,8 @@ pub enum Order {
     Text,
     /// The world: a reset, or another scene.
     Replace(Box<Replacement>),
+    /// The same, by the next one of those that are made one after the other.
+    ReplaceByNext,
 }
 
 /// Which of the two.

@@ -2,15 +2,18 @@
 //!
 //! Model: two lanes. What a script has for later waits in one of them, in its order; what somebody wants now goes past it in
 //! the other.
+//! Worlds of a script come by themselves, a few at a time: each takes memory, and a script may have hundreds. An order for the next
+//! one waits until that is there.
 //! Invariant: there is always room on the way back: what leaves something over is taken only where there is.
 
-use super::order::{Order, Spent};
+use super::order::{Order, Replacement, Spent};
 use rtrb::{Consumer, Producer, RingBuffer};
 
 /// The slow side's end.
 pub struct OrderSender {
     out: Producer<Dated>,
     now: Producer<Dated>,
+    worlds: Producer<Box<Replacement>>,
     back: Consumer<Spent>,
 }
 
@@ -18,6 +21,7 @@ pub struct OrderSender {
 pub struct OrderReceiver {
     orders: Consumer<Dated>,
     now: Consumer<Dated>,
+    worlds: Consumer<Box<Replacement>>,
     back: Producer<Spent>,
 }
 
@@ -44,9 +48,14 @@ pub enum Lane {
 pub fn order_queue(orders: usize) -> (OrderSender, OrderReceiver) {
     let (out, orders_end) = RingBuffer::new(orders);
     let (now, now_end) = RingBuffer::new(orders);
+    let (worlds, worlds_end) = RingBuffer::new(WORLDS_AHEAD);
     let (back, back_end) = RingBuffer::new(2 * orders);
-    (OrderSender { out, now, back: back_end }, OrderReceiver { orders: orders_end, now: now_end, back })
+    let receiver = OrderReceiver { orders: orders_end, now: now_end, worlds: worlds_end, back };
+    (OrderSender { out, now, worlds, back: back_end }, receiver)
 }
+
+/// Worlds of a script that are made before their time.
+const WORLDS_AHEAD: usize = 2;
 
 impl OrderSender {
     /// Sends an order. `false`: there is no room.
@@ -58,6 +67,16 @@ impl OrderSender {
     /// Whether there is no room for another order.
     pub fn is_full(&mut self, lane: Lane) -> bool {
         self.lane(lane).is_full()
+    }
+
+    /// Whether another world may be made before its time.
+    pub fn has_room_for_world(&self) -> bool {
+        !self.worlds.is_full()
+    }
+
+    /// Sends the world for the next order that waits for one; it is dropped where there is no room.
+    pub fn send_world(&mut self, world: Box<Replacement>) {
+        let _ = self.worlds.push(world);
     }
 
     fn lane(&mut self, lane: Lane) -> &mut Producer<Dated> {
@@ -83,14 +102,28 @@ impl OrderReceiver {
 
     /// The next order, if it is due.
     pub(super) fn take(&mut self, run_tick: u64) -> Option<Dated> {
-        let has_room = !self.back.is_full();
+        let (has_room, has_world) = (!self.back.is_full(), !self.worlds.is_empty());
         let may_come = |next: &Dated| {
-            let leaves_nothing = !matches!(next.order, Order::Replace(_) | Order::Friction(_));
-            next.at_tick <= run_tick && (leaves_nothing || has_room)
+            let has_all = match next.order {
+                Order::Replace(_) | Order::Friction(_) => has_room,
+                Order::ReplaceByNext => has_room && has_world,
+                _ => true,
+            };
+            next.at_tick <= run_tick && has_all
         };
         let lane =
             [&mut self.now, &mut self.orders].into_iter().find(|lane| lane.peek().is_ok_and(may_come))?;
-        lane.pop().ok()
+        let mut dated = lane.pop().ok()?;
+        if let Order::ReplaceByNext = dated.order {
+            dated.order = Order::Replace(self.worlds.pop().ok()?);
+        }
+        Some(dated)
+    }
+
+    /// Whether the next order is due by this tick and waits for a world.
+    pub(super) fn wants_world(&self, run_tick: u64) -> bool {
+        let waits = |next: &Dated| next.at_tick <= run_tick && matches!(next.order, Order::ReplaceByNext);
+        self.worlds.is_empty() && self.orders.peek().is_ok_and(waits)
     }
 
     /// Sends back what was replaced.

@@ -145,11 +145,6 @@ fn check_length(line: &str) -> Result<(), String> {
 /// Longer than any text that people can read in a window.
 pub const LONGEST_LINE_BYTES: usize = 1000;
 
-/// Whether an order takes the memory of a world.
-pub fn makes_a_world(order: &str) -> bool {
-    matches!(order.split_whitespace().next(), Some("reset" | "swap"))
-}
-
 /// What stands before the `#`.
 pub fn without_comment(line: &str) -> &str {
     line.split('#').next().unwrap_or_default()

@@ -204,6 +204,25 @@ fn begins_anew(scene: &str) {
 }
 
 #[test]
+fn a_script_may_bring_many_worlds_and_each_is_there_in_its_tick() {
+    let place = Place::new();
+    let other = place.write("other.toml", &PLATE.replace("velocity_m_s = [0.1", "velocity_m_s = [0.2"));
+    let swap = format!("swap {}", other.display());
+    let order = |number: usize| if number % 3 == 2 { &*swap } else { "reset" };
+    let script: Vec<_> =
+        (0..60).map(|number| format!("at {} {}", 0.2 * (number + 1) as f64, order(number))).collect();
+    let ticks = place.play(PLATE, &script.join("\n"), HandMode::Kinematic, 12.5);
+    let speed = |tick: &Tick| tick.bodies[0].velocity.x;
+    for number in 0..60 {
+        // A tenth of a second of fading after the order.
+        let begun = 200 * (number + 1) + 99;
+        let expected = if number < 2 { 0.1 } else { 0.2 };
+        assert_eq!(speed(&ticks[begun]), expected, "{number}");
+        assert!(number == 0 || speed(&ticks[begun - 1]) < 0.9 * expected, "{number}");
+    }
+}
+
+#[test]
 fn a_cube_on_a_plate_that_is_moved_goes_where_the_plate_goes() {
     for scene in both_lists(&PLATE.replace("velocity_m_s = [0.1, 0.0, 0.0]", "")) {
         is_carried(&scene);
@@ -281,10 +300,10 @@ fn what_cannot_be_done_is_refused_before_the_run_begins_with_its_line() {
         let said = place.refusal(PLATE, script);
         assert!(said.contains(expected), "{script}: {said}");
     }
-    let many = "at 1 reset\n".repeat(33);
+    let many = "at 1 reset\n".repeat(16_385);
     let endless = place.refusal(&format!("{ALL_SLOW}{CUBE}"), "at 1 move floor to 0 0 0 in 1");
     assert!(endless.contains("orders.txt:1: floor cannot be moved: it has no end"), "{endless}");
-    assert!(place.refusal(PLATE, &many).contains("orders.txt:33: too much for a script"));
+    assert!(place.refusal(PLATE, &many).contains("orders.txt:16385: too much for a script"));
 }
 
 #[test]
