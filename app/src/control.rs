@@ -120,7 +120,7 @@ impl Control {
         OrderTally { taken: self.taken, undone: self.gradual.undone(), never_reached }
     }
 
-    /// Whether an order is due by this tick of the run that waits for a world.
+    /// True if an order is due by this tick of the run that waits for a world.
     pub fn wants_world(&self, run_tick: u64) -> bool {
         self.orders.wants_world(run_tick)
     }

@@ -462,12 +462,12 @@ impl FastLoop {
         self.following = self.frame;
     }
 
-    /// Whether the next row would not have to wait, whatever moves.
+    /// True if the next row would not have to wait, whatever moves.
     pub fn has_room(&self) -> bool {
         self.rows.has_room(self.step.bodies().len(), usize::MAX)
     }
 
-    /// Whether the next tick would bring a world that is not made yet.
+    /// True if the next tick would bring a world that is not made yet.
     pub fn wants_world(&self) -> bool {
         self.control.as_ref().is_some_and(|control| control.wants_world(self.run_ticks() + 1))
     }

@@ -238,7 +238,7 @@ impl FastStep {
         &self.objects.gives_way
     }
 
-    /// How long the slow list had its turn in the last tick: no time of the fast step.
+    /// Time that the slow list's turn took in the last tick: no time of the fast step.
     pub fn slow_turn(&self) -> Duration {
         self.objects.slow_turn
     }

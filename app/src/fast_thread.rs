@@ -254,7 +254,7 @@ impl FastThread {
         }
     }
 
-    /// Where the clock waits, a script's world that is due is made first; one that cannot be made never comes.
+    /// Wait for a script's world that is due, on a clock that waits; one that cannot be made never comes.
     fn wait_for_world(&self) {
         let begin_ns = monotonic_ns();
         let is_over =

@@ -73,7 +73,7 @@ fn touched<T: Clone>(places: usize, with: T) -> (Producer<T>, Consumer<T>) {
 }
 
 impl RowSender {
-    /// Whether there is room for another row with so many bodies and so many others that were moved.
+    /// True if there is room for another row with so many bodies and so many others that were moved.
     pub fn has_room(&self, bodies: usize, others: usize) -> bool {
         let others = others.min(PLACED_QUEUE);
         !self.rows.is_full() && self.bodies.slots() >= bodies && self.placed.slots() >= others

@@ -260,7 +260,7 @@ impl Passage {
         }
     }
 
-    /// What is left of what fades.
+    /// Share that is left of a force which fades.
     fn share(&self) -> f64 {
         (1.0 - self.fading_s / FADE_S).max(0.0)
     }

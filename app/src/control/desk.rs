@@ -270,7 +270,7 @@ impl Desk {
         })
     }
 
-    /// What the running scene is from here on is what a world to come has.
+    /// Order for a world that has the scene as it is at this place of the script, and is made later.
     fn replace_later(&mut self, is_other: bool) -> Order {
         let rig = Arc::clone(self.shared_rig.get_or_insert_with(|| Arc::new(self.rig.clone())));
         self.later.push_back(Later { rig, is_other });

@@ -69,7 +69,7 @@ impl OrderSender {
         self.lane(lane).is_full()
     }
 
-    /// Whether another world may be made before its time.
+    /// True if another world may be made before its time.
     pub fn has_room_for_world(&self) -> bool {
         !self.worlds.is_full()
     }
@@ -120,7 +120,7 @@ impl OrderReceiver {
         Some(dated)
     }
 
-    /// Whether the next order is due by this tick and waits for a world.
+    /// True if the next order is due by this tick and waits for a world.
     pub(super) fn wants_world(&self, run_tick: u64) -> bool {
         let waits = |next: &Dated| next.at_tick <= run_tick && matches!(next.order, Order::ReplaceByNext);
         self.worlds.is_empty() && self.orders.peek().is_ok_and(waits)

@@ -88,7 +88,7 @@ pub struct Objects {
     pub(super) most_stepped: usize,
     /// What the last tick took.
     pub made: Made,
-    /// How long the slow list had its turn in it.
+    /// Time that the slow list's turn took in it.
     pub(super) slow_turn: Duration,
     /// By how much it moved them (s).
     pub(super) stepped_s: f64,
@@ -419,7 +419,7 @@ impl Objects {
         gave_way
     }
 
-    /// Whether an entity is a body that has not been handed over yet, and is not an order's.
+    /// True of a body that has not been handed over yet, and is not an order's.
     fn is_on_its_way(&self, entity: usize) -> bool {
         let (Some(lists), Some(body)) = (&self.lists, self.manipulation.body_of(entity)) else {
             return false;
@@ -581,7 +581,7 @@ impl Objects {
     }
 }
 
-/// What of a force is felt where bodies lean on others that wait (N): it fades, the harder they are pressed.
+/// Part of a force that is felt where bodies lean on others that wait (N): it fades, the harder they are pressed.
 fn felt_of_leaning_n(pressed_n: f64) -> f64 {
     let left = (GIVEN_UP_N - pressed_n) / (GIVEN_UP_N - MOST_LEANING_N);
     pressed_n.min(MOST_LEANING_N * left.max(0.0))

@@ -193,7 +193,7 @@ impl EventTeller {
     }
 }
 
-/// Whether something begins that `is` so in this tick and goes on for a while (s) when it is not any more.
+/// True if something begins that `is` so in this tick and goes on for a while (s) when it is not any more.
 fn begins(is: bool, left_s: &mut f64, period_s: f64) -> bool {
     let begins = is && *left_s <= 0.0;
     *left_s = if is { GOES_ON_S } else { *left_s - period_s };

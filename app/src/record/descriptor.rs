@@ -89,7 +89,7 @@ impl MessageType {
         Self { name: name.into(), fields: fields.iter().map(field).collect() }
     }
 
-    /// Whether names in JSON are not unique, which come without underscores where nothing else is said: readers refuse that.
+    /// True if names in JSON are not unique, which come without underscores where nothing else is said: readers refuse that.
     fn has_like_json_names(&self) -> bool {
         let mut taken = std::collections::HashSet::new();
         self.fields.iter().any(|field| !taken.insert(json_name(&field.name)))

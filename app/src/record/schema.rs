@@ -72,7 +72,7 @@ pub(super) mod tick {
         FIRST_PART + part as u32 - 1
     }
 
-    /// Which object is the first of the message that a field is.
+    /// Number of the first object of the message that a field is.
     pub(in crate::record) fn first_of_part(field: u32) -> Option<usize> {
         (FIRST_PART..FIRST_FINGER).contains(&field).then(|| MOST_IN_ONE * (field - FIRST_PART + 1) as usize)
     }

@@ -27,7 +27,7 @@ pub(super) struct SoFar {
     pairs: BTreeSet<[usize; 2]>,
     /// Whether nothing moves by itself.
     pub(super) is_paused: bool,
-    /// Whether bodies wait for their turn.
+    /// True while bodies wait for their turn.
     pub(super) is_overloaded: bool,
     /// Orders that were taken, by their numbers, in the order in which they were.
     orders: Vec<u64>,

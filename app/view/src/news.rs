@@ -66,7 +66,7 @@ pub struct Status {
     pub recording: Option<String>,
     /// Whether things stand still.
     pub is_paused: bool,
-    /// Whether all that moves is more than a tick has time for.
+    /// True while all that moves is more than a tick has time for.
     pub is_overloaded: bool,
 }
 

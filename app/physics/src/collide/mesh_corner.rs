@@ -63,14 +63,14 @@ impl Corner {
         !is_closed
     }
 
-    /// What [`Self::sticks_out`] asks, of one edge: if it does, one of the faces around it says so.
+    /// Answer of [`Self::sticks_out`] for one edge: if it does, one of the faces around it says so.
     pub(super) fn sticks_out_here(self, mesh: &Mesh) -> bool {
         let (face, corner) = (&mesh.faces()[(self.0 / 3) as usize], (self.0 % 3) as usize);
         let link = face.links[corner];
         link.is_boundary() || link.is_turned() || bends(mesh, face, corner)
     }
 
-    /// What [`Self::is_in_a_plane`] denies, of one edge: if it is not, one of the faces around it says so.
+    /// Denial of [`Self::is_in_a_plane`] for one edge: if it is not, one of the faces around it says so.
     pub(super) fn is_bent_here(self, mesh: &Mesh) -> bool {
         let (face, corner) = (&mesh.faces()[(self.0 / 3) as usize], (self.0 % 3) as usize);
         let link = face.links[corner];

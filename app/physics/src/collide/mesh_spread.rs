@@ -59,7 +59,7 @@ pub(super) struct Lows {
     count: usize,
     chosen: [u32; MAX_POINTS],
     groups: usize,
-    /// How often every second one is left out.
+    /// Number of times that every second one is left out.
     halvings: u32,
 }
 

@@ -361,7 +361,7 @@ fn round_meshes_as_felt_stand_and_lie_where_they_fall() {
     assert!(leans.min(PI - leans) < 0.1 && finest.body(0).velocity_W.norm() < 1e-3, "{leans}");
 }
 
-/// What stands in for a floor: its top is at height 0, and things come down there at this x.
+/// Stand-in for a floor: its top is at height 0, and things come down there at this x.
 fn supports() -> Vec<(&'static str, Entity, f64)> {
     let slab = Isometry3::translation(0.0, -0.05, 0.0);
     let flat = |_: f64, _: f64| 0.0;

@@ -36,7 +36,7 @@ pub(super) struct McapRows {
     order: TickOrder,
     channels: Channels,
     first: Option<(Row, Vec<BodyRow>)>,
-    /// The bodies of the last tick of this chunk: one that is not told again is as it was.
+    /// The bodies of the last tick: one that is not told again is as it was. Other programs may have put ticks into other chunks.
     before: Option<Vec<BodyRow>>,
     rows: u64,
     pub(super) names: Names,
@@ -205,10 +205,7 @@ impl McapRows {
             }
             Kept::Facts(name, facts) if name == ABOUT || name == COLUMNS => self.take_facts(&name, facts)?,
             Kept::Facts(name, facts) if name == END => self.end(&facts)?,
-            Kept::Chunk(Ok(records)) => {
-                self.chunk = OpenChunk { records, at: 0 };
-                self.before = None;
-            }
+            Kept::Chunk(Ok(records)) => self.chunk = OpenChunk { records, at: 0 },
             Kept::Chunk(Err(ChunkError::Damage(why))) => return Err(self.damaged(&why)),
             Kept::Chunk(Err(ChunkError::Memory)) => {
                 return Err(ReadError::Memory { file: self.path.clone(), rows: self.rows });

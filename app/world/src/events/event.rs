@@ -131,7 +131,7 @@ pub enum Kind {
     Overload {
         /// Which of the two.
         change: Change,
-        /// How many wait; at the end, the most that did.
+        /// Number that wait; at the end, the most that did.
         waiting: u32,
     },
     /// The driver switched the motors off, which ends a run.
