@@ -158,10 +158,12 @@ impl Manipulation {
         let count = bodies.len();
         let places = count + MAX_DRIVEN;
         let most_pairs = count.saturating_mul(entities.len());
-        let pairs = most_pairs.min(PAIRS.max(PAIRS_OF_BODY * count));
+        // Of those elsewhere few come here at once; more room is made when they do.
+        let here = if are_here { count } else { 0 };
+        let pairs = most_pairs.min(PAIRS.max(PAIRS_OF_BODY * here));
         let pairs = Pairs::with_capacity(pairs, most_pairs);
         let rows = RowCounts {
-            of_pairs: (pairs.room() * MAX_POINTS).min(ROWS.max(ROWS_OF_BODY * count)),
+            of_pairs: (pairs.room() * MAX_POINTS).min(ROWS.max(ROWS_OF_BODY * here)),
             of_fingers: MAX_TOUCHES + MAX_PULLS,
             bodies: count,
         };
