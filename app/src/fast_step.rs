@@ -340,8 +340,15 @@ impl FastStep {
             };
             row.force_on_user = finite_or_zero(row.force_on_user * self.strength);
             row.torque_on_user = finite_or_zero(row.torque_on_user * self.strength);
-            let of =
-                Line { index, finger: &finger.finger, felt, strength: self.strength, dt_s, hip_W: row.hip };
+            let of = Line {
+                index,
+                finger: &finger.finger,
+                felt,
+                strength: self.strength,
+                left_n: self.passages[index].begun_n(),
+                dt_s,
+                hip_W: row.hip,
+            };
             row.force_on_user =
                 finite_or_zero(line.hold(row.force_on_user, &of, &mut self.objects, &self.entities));
             if let Some(port) = port {

@@ -129,6 +129,8 @@ pub struct Passage {
     /// What it left behind, and for how long it has been fading (s).
     left_W: Vector3<f64>,
     fading_s: f64,
+    /// How much of it was left in the last tick (N).
+    begun_n: f64,
     /// Forces of the last tick (N) of contacts with what is open in doors.
     felt: [Option<(usize, Vector3<f64>)>; MOST_OPEN],
 }
@@ -143,14 +145,20 @@ impl Passage {
     /// Of a finger that was not seen yet.
     pub fn new(doors: &[Door]) -> Self {
         let seen = vec![None; doors.len()].into();
-        Self { seen, left_W: Vector3::zeros(), fading_s: FADE_S, felt: [None; MOST_OPEN] }
+        Self { seen, left_W: Vector3::zeros(), fading_s: FADE_S, begun_n: 0.0, felt: [None; MOST_OPEN] }
     }
 
     /// The finger is somewhere else: nobody saw how it came there.
     pub fn reset(&mut self) {
         self.seen.fill(None);
         self.fading_s = FADE_S;
+        self.begun_n = 0.0;
         self.felt.fill(None);
+    }
+
+    /// Force that contacts pressed with and that is felt without them since the last tick (N).
+    pub fn begun_n(&self) -> f64 {
+        self.begun_n
     }
 
     /// A tick of a finger, which `step` does: once, or, in the tick in which it goes through a door, once on either side.
@@ -165,6 +173,7 @@ impl Passage {
         mut step: impl FnMut(&mut Finger) -> FingerOutput,
     ) -> (FingerOutput, Option<Crossing>) {
         let mut output = step(finger);
+        self.begun_n = 0.0;
         if doors.is_empty() {
             return (output, None);
         }
@@ -192,6 +201,7 @@ impl Passage {
                 left_W += dragged_W - stays_W(finger);
             }
         }
+        self.begun_n = left_W.norm();
         if left_W != Vector3::zeros() {
             (self.left_W, self.fading_s) = (self.left_W * self.share() + left_W, 0.0);
         }

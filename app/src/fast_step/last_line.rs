@@ -71,6 +71,8 @@ pub(super) struct Line<'a> {
     pub(super) felt: &'a FingerEffects,
     /// Of all forces.
     pub(super) strength: f64,
+    /// Force of contacts that is felt beside them since this tick (N).
+    pub(super) left_n: f64,
     pub(super) dt_s: f64,
     /// Where the HIP is (m).
     pub(super) hip_W: Vector3<f64>,
@@ -133,7 +135,8 @@ impl LastLine {
         std::mem::swap(&mut self.last, &mut self.next);
         let way_m = (line.hip_W - std::mem::replace(&mut self.hip_W, line.hip_W)).norm();
         let given_n = objects.tie_n(line.index, way_m) + objects.pulled_n(line.index);
-        let mut explained_n = line.felt.explained_n() * line.strength + given_n + self.beside.given_n;
+        let others_n = line.felt.explained_n() + line.left_n;
+        let mut explained_n = others_n * line.strength + given_n + self.beside.given_n;
         if faded > 0.0 {
             explained_n += faded * beside_W.norm() / line.strength.max(faded);
         }

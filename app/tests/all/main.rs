@@ -5,6 +5,7 @@
 #[path = "../../haptics/tests/common/counting.rs"]
 mod counting;
 
+mod doors;
 mod faded_forces;
 mod mouse_hand;
 mod on_request;
