@@ -82,6 +82,8 @@ pub struct Objects {
     given_up: Vec<(usize, usize)>,
     /// Of each finger, for how many ticks it is still taken for one that presses bodies into others that wait.
     leaning: Vec<u32>,
+    /// Force with which each of those pushes things away (N).
+    pushes_n: Vec<f64>,
     /// Of each finger, whether it felt less in the last tick, since what it presses had not been handed over, or waited.
     pub(super) gives_way: Vec<bool>,
     /// The most bodies that a tick steps.
@@ -136,6 +138,7 @@ impl Objects {
             moved: Moved::default(),
             given_up: Vec::with_capacity(room.min(MOST_GIVEN_UP)),
             leaning: vec![0; fingers.len()],
+            pushes_n: vec![0.0; fingers.len()],
             gives_way: vec![false; fingers.len()],
             most_stepped: usize::MAX,
             made: Made::default(),
@@ -374,6 +377,9 @@ impl Objects {
         for finger in 0..self.leaning.len() {
             let leans = self.touches.iter().any(|touch| touch.finger == finger && touch.leans_on_waiting);
             self.leaning[finger] = if leans { LEANS_ON } else { self.leaning[finger].saturating_sub(1) };
+            self.pushes_n[finger] = if self.leaning[finger] > 0 { self.pushes_n(finger) } else { 0.0 };
+        }
+        for finger in 0..self.leaning.len() {
             self.gives_way[finger] = self.give_way_to(finger);
         }
     }
@@ -381,9 +387,7 @@ impl Objects {
     /// Says whether anything did.
     fn give_way_to(&mut self, finger: usize) -> bool {
         let mut gave_way = false;
-        let lies_on_nothing = |touch: &Touch| self.is_on_its_way(touch.entity);
-        let leaning_n = self.touches.iter().filter(|touch| touch.finger == finger && !lies_on_nothing(touch));
-        let leaning_n = leaning_n.map(|touch| touch.force_on_user_W.norm()).sum();
+        let pushes_n = self.pushes_n[finger];
         for at in 0..self.touches.len() {
             let touch = self.touches[at];
             if touch.finger != finger {
@@ -393,10 +397,8 @@ impl Objects {
             let is_on_its_way = self.is_on_its_way(touch.entity);
             let (pressed_n, felt_n) = if is_on_its_way {
                 (touch_n, touch_n.min(MOST_UNTIL_IT_COMES_N))
-            } else if self.leaning[finger] > 0 {
-                (leaning_n, felt_of_leaning_n(leaning_n))
             } else {
-                continue;
+                (pushes_n, felt_of_leaning_n(pushes_n))
             };
             if felt_n >= pressed_n {
                 continue;
@@ -417,6 +419,25 @@ impl Objects {
             }
         }
         gave_way
+    }
+
+    /// Force with which a finger pushes things away (N): of what other fingers press against it holds them.
+    fn pushes_n(&self, finger: usize) -> f64 {
+        let force_W = |entity: usize, is_own: bool| -> Vector3<f64> {
+            let all = self.touches.iter().filter(|touch| touch.entity == entity);
+            let counted = all.filter(|touch| !is_own || touch.finger == finger);
+            counted.map(|touch| touch.force_on_user_W).sum()
+        };
+        let is_first = |at: usize, touch: &Touch| {
+            let before = &self.touches[..at];
+            before.iter().all(|other| (other.finger, other.entity) != (finger, touch.entity))
+        };
+        let own = self.touches.iter().enumerate().filter(|(at, touch)| {
+            touch.finger == finger && is_first(*at, touch) && !self.is_on_its_way(touch.entity)
+        });
+        own.map(|(_, touch)| [true, false].map(|is_own| force_W(touch.entity, is_own).norm()))
+            .map(|[own_n, net_n]| own_n.min(net_n))
+            .sum()
     }
 
     /// True of a body that has not been handed over yet, and is not an order's.

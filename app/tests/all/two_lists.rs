@@ -179,6 +179,31 @@ fn a_row_that_a_finger_pushes_into_what_waits_for_its_turn_is_no_wall() {
 }
 
 #[test]
+fn what_two_fingers_hold_between_them_among_bodies_that_wait_is_held_as_ever() {
+    // A row of cubes that touch; the first of them is between two fingers, with 24 N each.
+    let row = cube("mass_kg = 0.1\ngrid = { count = [12, 1, 1], spacing_m = [0.0399, 1, 1] }");
+    let scene = STANDING.replacen("[[finger]]", "[[finger]]\n[[finger]]", 1);
+    let mut step = step(&format!("{scene}{row}"));
+    let (mut waited, mut last) = (0, Row::empty());
+    for tick in 0..1500_u64 {
+        let aside_m = 0.02 + 0.01 - 2e-4 * tick.min(290) as f64;
+        let (mut frame, mut row) = (Frame::zeroed(), Row::empty());
+        (frame.tick, frame.device_count, frame.run_tick) = (tick + 1, 2, tick as i64);
+        for (device, side) in frame.devices.iter_mut().zip([1.0, -1.0]) {
+            (device.flags, device.position_m_measured) = (DEVICE_POSITION_VALID, [0.0, 0.02, side * aside_m]);
+        }
+        step.step_at_most(4);
+        step.step(&frame, &mut Command::zeroed(), &mut row);
+        waited += u64::from(step.made().held > 0);
+        assert!(!step.gives_way().contains(&true), "{tick}");
+        last = row;
+    }
+    // 500 N/m, 48 mm deep: past the middle, each on the side that it came from.
+    let held = [0, 1].map(|finger| last.fingers[finger].force_on_user.norm());
+    assert!(waited > 300 && held[0] > 10.0 && (held[0] - held[1]).abs() < 0.1, "{waited} {held:?}");
+}
+
+#[test]
 fn a_large_island_that_has_not_come_yet_is_felt_as_one_that_is_fixed_until_all_of_it_is_there() {
     let row =
         |mass: &str| cube(&format!("{mass}\ngrid = {{ count = [60, 1, 1], spacing_m = [0.04, 1, 1] }}"));
