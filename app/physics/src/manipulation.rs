@@ -74,8 +74,8 @@ pub struct Manipulation {
     spare_j: Vec<f64>,
     /// Of each island, what impulses put into it in a tick \[J\].
     impulses_j: Vec<f64>,
-    /// Of each island, whether it leans on bodies that wait.
-    are_leaning: Vec<bool>,
+    /// Of each island, the force of bodies that wait on it \[N\].
+    held_W: Vec<Vector3<f64>>,
     hand: Hand,
     sets: Sets,
     /// The first so many rows are fingers', and the first so many of these press or hold.
@@ -184,7 +184,7 @@ impl Manipulation {
             struck: Struck::new(count, places),
             spare_j: Vec::with_capacity(places),
             impulses_j: Vec::with_capacity(places),
-            are_leaning: Vec::with_capacity(places),
+            held_W: Vec::with_capacity(places),
             hand: Hand::new(&[], count),
             sets: Sets::with_capacity(count),
             touching: 0,
@@ -301,7 +301,7 @@ impl Manipulation {
                 touch.force_on_user_W = -self.room.rows[row].force_W;
             }
         }
-        self.find_what_leans_on_waiting(touches);
+        self.find_what_waiting_holds(touches);
         for (at, pull) in pulls.iter_mut().enumerate() {
             // What somebody else steps is as good as fixed.
             let body = self.body_of(pull.entity);

@@ -33,9 +33,10 @@ pub struct Touch {
     pub stiffness_n_per_m: f64,
     /// Of the face that is touched ([`Entity::felt_material`]).
     pub label: u16,
-    /// Answer of [`Manipulation::step`](crate::Manipulation::step): the body, or what it pushes, was stopped in the tick by bodies
-    /// that are fixed only until they are stepped: their turn has not come, or they are on their way from elsewhere.
-    pub leans_on_waiting: bool,
+    /// Answer of [`Manipulation::step`](crate::Manipulation::step): force, beyond their weight, with which bodies that are fixed
+    /// only until they are stepped held this one and all that it is joined with by contacts \[N\]: their turn has not come, or
+    /// they are on their way from elsewhere.
+    pub held_by_waiting_n: f64,
 }
 
 impl Touch {
@@ -50,7 +51,7 @@ impl Touch {
             is_sticking: ContactState::from(contact.friction) == ContactState::Stick,
             stiffness_n_per_m: contact.stiffness_n_per_m,
             label: contact.label,
-            leans_on_waiting: false,
+            held_by_waiting_n: 0.0,
         }
     }
 

@@ -33,7 +33,7 @@ const MOST_UNTIL_IT_COMES_N: f64 = 3.0;
 const MOST_LEANING_N: f64 = 10.0;
 /// From where on such a contact is given up \[N\]: some centimetres deep.
 const GIVEN_UP_N: f64 = 20.0;
-/// Ticks for which a finger leans on after it did: bodies that were squeezed come back.
+/// Ticks for which a finger leans on after it did.
 const LEANS_ON: u32 = 64;
 const MOST_GIVEN_UP: usize = 64;
 /// Ticks that a single step of the objects makes up for at most.
@@ -84,6 +84,8 @@ pub struct Objects {
     leaning: Vec<u32>,
     /// Force with which each of those pushes things away (N).
     pushes_n: Vec<f64>,
+    /// Part of that which bodies that wait hold (N).
+    held_n: Vec<f64>,
     /// Of each finger, whether it felt less in the last tick, since what it presses had not been handed over, or waited.
     pub(super) gives_way: Vec<bool>,
     /// The most bodies that a tick steps.
@@ -139,6 +141,7 @@ impl Objects {
             given_up: Vec::with_capacity(room.min(MOST_GIVEN_UP)),
             leaning: vec![0; fingers.len()],
             pushes_n: vec![0.0; fingers.len()],
+            held_n: vec![0.0; fingers.len()],
             gives_way: vec![false; fingers.len()],
             most_stepped: usize::MAX,
             made: Made::default(),
@@ -375,9 +378,15 @@ impl Objects {
     /// much, and goes through. They have not been handed over yet, or wait for their turn.
     fn give_way(&mut self) {
         for finger in 0..self.leaning.len() {
-            let leans = self.touches.iter().any(|touch| touch.finger == finger && touch.leans_on_waiting);
-            self.leaning[finger] = if leans { LEANS_ON } else { self.leaning[finger].saturating_sub(1) };
-            self.pushes_n[finger] = if self.leaning[finger] > 0 { self.pushes_n(finger) } else { 0.0 };
+            let own = self.touches.iter().filter(|touch| touch.finger == finger);
+            let held_n = own.map(|touch| touch.held_by_waiting_n).fold(0.0, f64::max);
+            let left = self.leaning[finger];
+            let pushes_n = if held_n > 0.0 || left > 0 { self.pushes_n(finger) } else { 0.0 };
+            // Bodies that were squeezed come back for a while, with nobody behind them.
+            let is_held = held_n.min(pushes_n) > MOST_LEANING_N;
+            self.leaning[finger] = if is_held { LEANS_ON } else { left.saturating_sub(1) };
+            self.pushes_n[finger] = pushes_n;
+            self.held_n[finger] = if is_held || left == 0 { held_n.min(pushes_n) } else { pushes_n };
         }
         for finger in 0..self.leaning.len() {
             self.gives_way[finger] = self.give_way_to(finger);
@@ -387,7 +396,7 @@ impl Objects {
     /// Says whether anything did.
     fn give_way_to(&mut self, finger: usize) -> bool {
         let mut gave_way = false;
-        let pushes_n = self.pushes_n[finger];
+        let [pushes_n, held_n] = [self.pushes_n[finger], self.held_n[finger]];
         for at in 0..self.touches.len() {
             let touch = self.touches[at];
             if touch.finger != finger {
@@ -395,10 +404,10 @@ impl Objects {
             }
             let touch_n = touch.force_on_user_W.norm();
             let is_on_its_way = self.is_on_its_way(touch.entity);
-            let (pressed_n, felt_n) = if is_on_its_way {
-                (touch_n, touch_n.min(MOST_UNTIL_IT_COMES_N))
+            let (pressed_n, felt_n, stopped_n) = if is_on_its_way {
+                (touch_n, touch_n.min(MOST_UNTIL_IT_COMES_N), touch_n)
             } else {
-                (pushes_n, felt_of_leaning_n(pushes_n))
+                (pushes_n, pushes_n - (held_n - MOST_LEANING_N).max(0.0), held_n)
             };
             if felt_n >= pressed_n {
                 continue;
@@ -414,7 +423,7 @@ impl Objects {
             }
             self.touches[at].force_on_user_W = force_on_user_W;
             // What comes later must not find a spring of any length.
-            if pressed_n > GIVEN_UP_N && self.given_up.len() < self.given_up.capacity() {
+            if stopped_n > GIVEN_UP_N && self.given_up.len() < self.given_up.capacity() {
                 self.given_up.push((touch.finger, touch.entity));
             }
         }
@@ -600,12 +609,6 @@ impl Objects {
         }
         self.felt_pulls = self.pulls.len();
     }
-}
-
-/// Part of a force that is felt where bodies lean on others that wait (N): it fades, the harder they are pressed.
-fn felt_of_leaning_n(pressed_n: f64) -> f64 {
-    let left = (GIVEN_UP_N - pressed_n) / (GIVEN_UP_N - MOST_LEANING_N);
-    pressed_n.min(MOST_LEANING_N * left.max(0.0))
 }
 
 fn orientation([w, x, y, z]: [f64; 4]) -> UnitQuaternion<f64> {

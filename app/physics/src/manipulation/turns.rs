@@ -84,12 +84,12 @@ impl Manipulation {
         self.turns.held.iter().filter(|body| self.roster.standing(**body as usize) == Standing::Held).count()
     }
 
-    /// After the forces of a tick were found: which touches are on islands that press bodies which wait.
-    pub(super) fn find_what_leans_on_waiting(&mut self, touches: &mut [Touch]) {
-        let Self { roster, room, pairs, driven, are_leaning, .. } = self;
+    /// After the forces of a tick were found: those with which bodies that wait hold what is touched, and what that pushes.
+    pub(super) fn find_what_waiting_holds(&mut self, touches: &mut [Touch]) {
+        let Self { roster, room, pairs, driven, held_W, bodies, settings, .. } = self;
         let islands = room.solver.islands();
-        are_leaning.clear();
-        are_leaning.resize(islands.iter().len(), false);
+        held_W.clear();
+        held_W.resize(islands.iter().len(), Vector3::zeros());
         let waits = |entity: usize| {
             let standing = roster.numbers[entity].map(|body| roster.standing(body as usize));
             standing.is_some_and(|standing| standing == Standing::Held || standing.is_away())
@@ -97,20 +97,27 @@ impl Manipulation {
         };
         for (_, pair) in pairs.iter_awake() {
             let [one, other] = pair.entities;
-            for (leaning, fixed) in [(one, other), (other, one)] {
+            for (leaning, fixed, sign) in [(one, other, 1.0), (other, one, -1.0)] {
                 let place = roster.place_of_entity(leaning);
                 if let Some(island) = place.and_then(|place| islands.island_of(place))
                     && waits(fixed)
-                    && pair.force_W(&room.rows) != Vector3::zeros()
                 {
-                    are_leaning[island] = true;
+                    held_W[island] += pair.force_W(&room.rows) * sign;
                 }
             }
         }
+        let beyond_weight_n = |island: usize| {
+            let members = islands.iter().nth(island).unwrap_or_default();
+            let mass_kg: f64 = members.iter().map(|&place| bodies[place].mass.mass_kg).sum();
+            let up_W = -settings.gravity_W.try_normalize(0.0).unwrap_or_default();
+            let bears_n = held_W[island].dot(&up_W).clamp(0.0, mass_kg * settings.gravity_W.norm());
+            (held_W[island] - up_W * bears_n).norm()
+        };
         for touch in touches {
             let place = roster.place_of_entity(touch.entity);
-            let island = place.and_then(|place| islands.island_of(place));
-            touch.leans_on_waiting = island.is_some_and(|island| are_leaning[island]);
+            let held = place.and_then(|place| islands.island_of(place));
+            let held = held.filter(|&island| held_W[island] != Vector3::zeros());
+            touch.held_by_waiting_n = held.map_or(0.0, beyond_weight_n);
         }
     }
 

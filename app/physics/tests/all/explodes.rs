@@ -141,7 +141,7 @@ fn touches_that_are_no_numbers_press_nothing() {
                 is_sticking: true,
                 stiffness_n_per_m: 1000.0,
                 label: 0,
-                leans_on_waiting: false,
+                held_by_waiting_n: 0.0,
             };
             change(&mut touch);
             for _ in 0..10 {

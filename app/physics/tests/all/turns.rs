@@ -133,7 +133,7 @@ fn a_heap_that_sleeps_wakes_no_farther_than_there_is_time_for_and_nothing_alloca
 }
 
 #[test]
-fn a_touch_tells_where_its_body_leans_on_who_waits() {
+fn a_touch_tells_with_how_much_those_that_wait_hold_its_body() {
     // A row of cubes, of which the last one leans on a wall, and one that stands apart.
     let scene = || {
         let mut entities = vec![floor(0.0, 2000.0, 0.5)];
@@ -153,7 +153,7 @@ fn a_touch_tells_where_its_body_leans_on_who_waits() {
             world.manipulation.step_at_most(most, std::iter::once(hip));
             world.step(&[hip]);
             touched += world.touches.len();
-            leaning += world.touches.iter().filter(|touch| touch.leans_on_waiting).count();
+            leaning += world.touches.iter().filter(|touch| touch.held_by_waiting_n > 0.0).count();
         }
         assert!(touched > 400, "{touched}");
         leaning
