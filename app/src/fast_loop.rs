@@ -60,6 +60,8 @@ pub struct FastLoop {
     /// Finds what happens, and where that is told, if anybody wants to know.
     teller: EventTeller,
     events: Option<EventSender>,
+    /// In which tick of the run the driver told its fault, if it did.
+    fault_tick: Option<u64>,
     /// Whether no other scene has taken over.
     is_first_scene: bool,
     rows: RowSender,
@@ -163,6 +165,7 @@ impl FastLoop {
             pace: None,
             control: None,
             events: None,
+            fault_tick: None,
             is_first_scene: true,
             rows,
             when_full,
@@ -256,6 +259,14 @@ impl FastLoop {
         let run_tick = self.row.run_tick.saturating_add(since);
         if let Some(events) = &mut self.events {
             events.send(Event { run_tick, kind: Kind::Fault { reason: self.frame.fault } });
+            self.fault_tick = Some(run_tick);
+        }
+    }
+
+    /// The run is over: tells that all ends that touched in its last tick. Nothing is told any more after that.
+    pub fn end_events(&mut self) {
+        if let Some(mut events) = self.events.take() {
+            self.teller.end_run(self.fault_tick, &mut events);
         }
     }
 

@@ -281,11 +281,12 @@ impl Play {
     }
 
     fn conclude(
-        self,
+        mut self,
         args: &ReplayArgs,
         stage: &Stage,
         ended: Result<Stop, RunFailure>,
     ) -> Result<ExitCode, RunFailure> {
+        self.fast.end_events();
         let Self { feed, mut difference, recorders, mut events, period_ns, missing, rows_read, .. } = self;
         events.deliver(u64::MAX);
         let recordings: Vec<_> = recorders.into_iter().map(Recorder::finish).collect();

@@ -278,6 +278,7 @@ fn run_virtual(
     let stop = driver.run(&mut fast, &mut slow, &mut progress, signals);
     progress.end();
     let stop = stop.of_run(&fast.tally);
+    fast.end_events();
     let SlowEnd { recordings, events, pictures } = slow.finish();
     let stop = stop.inspect_err(|_| tell_kept(&recordings))?;
     let report = Report {

@@ -158,6 +158,9 @@ pub fn run(
         };
         let FastRemains { driver, mut fast, .. } = remains;
         let lists = fast.step_mut().end_lists(slow_list.and_then(SlowThread::end));
+        // So that there is room for what comes last.
+        slow.step();
+        fast.end_events();
         let orders = fast.orders();
         return Ok(TwoProcessEnd { tally, stop, driver, fast_report: report, orders, lists });
     }

@@ -21,6 +21,7 @@ mod turns;
 pub use driven::MAX_DRIVEN;
 pub use made::{Made, Parked, Reason};
 pub use parcel::Parcel;
+pub use pressing::PairStanding;
 pub use room::{Room, Wanted};
 
 use arrival::Arrival;

@@ -6,7 +6,7 @@
 use super::{Cut, FastStep};
 use crate::row::Row;
 use haptics::ContactState;
-use world::events::{Change, EventSender, FastPairs, Kind, List, PairForce, Touching, Watch};
+use world::events::{Change, Event, EventSender, Kind, List, PairForce, Touching, Watch};
 use world::lists::Handed;
 
 /// Pairs of entities that are watched at once.
@@ -20,15 +20,15 @@ const GOES_ON_S: f64 = 0.1;
 
 /// Tells, after each step of a world, what is new.
 pub struct EventTeller {
-    watch: Watch,
+    watch: Box<Watch>,
+    /// One of nothing, for when the watch is sent away, as its world ends.
+    of_nothing: Option<Box<Watch>>,
     /// Of each finger, how long it is still said to be in a crowd (s).
     crowded_s: Vec<f64>,
     /// Likewise, that what it presses gives way (s).
     gives_way_s: Vec<f64>,
     /// For how long an overload goes on, and the most bodies that waited in it; `None`: there is none.
     overload: Option<(f64, u32)>,
-    /// What the slow list tells of its pairs, if there is one.
-    slow: Option<FastPairs>,
     touching: Vec<Touching>,
     /// Of each body, whether another thread has it.
     elsewhere: Vec<bool>,
@@ -46,12 +46,13 @@ impl EventTeller {
         let bodies = step.bodies().len();
         let most_touched = step.fingers.iter().map(|finger| finger.finger.capacity()).max().unwrap_or(0);
         let pairs = bodies.saturating_mul(step.entities().len()).min(MOST_PAIRS);
+        let watch = Watch::new(step.fingers.len(), most_touched, pairs, step.period_s).with_slow(slow);
         Self {
-            watch: Watch::new(step.fingers.len(), most_touched, pairs, step.period_s),
+            watch: Box::new(watch),
+            of_nothing: Some(Box::default()),
             crowded_s: vec![0.0; step.fingers.len()],
             gives_way_s: vec![0.0; step.fingers.len()],
             overload: None,
-            slow,
             touching: Vec::with_capacity(most_touched),
             elsewhere: (0..bodies).map(|body| step.objects.is_slow(body)).collect(),
             gone: Vec::with_capacity(MOST_GONE.min(bodies)),
@@ -84,10 +85,27 @@ impl EventTeller {
 
     /// The world ends in this tick of the run, and `next` tells of the one that takes over.
     pub fn end(&mut self, next: &mut Self, run_tick: u64, why: Kind, out: &mut EventSender) {
+        self.watch.hand_on(&mut next.watch);
+        self.end_all(run_tick, out);
+        out.send(Event { run_tick, kind: why });
+    }
+
+    /// The run is over: all that began ends in the last tick that was told, or in a later one in which it stopped.
+    pub fn end_run(&mut self, stopped: Option<u64>, out: &mut EventSender) {
+        if let Some(run_tick) = self.watch.last_tick() {
+            self.end_all(stopped.map_or(run_tick, |stopped| stopped.max(run_tick)), out);
+        }
+    }
+
+    fn end_all(&mut self, run_tick: u64, out: &mut EventSender) {
+        let Some(of_nothing) = self.of_nothing.take() else { return };
         self.watch.begin(run_tick);
-        self.watch.end(&mut next.watch, out);
         self.end_overload(out);
-        self.watch.tell(why, out);
+        let ended = std::mem::replace(&mut self.watch, of_nothing);
+        if let Err(ended) = ended.end(run_tick, out) {
+            // It is not freed here.
+            self.watch = ended;
+        }
     }
 
     fn find_touching(&mut self, step: &FastStep, finger: usize) {
@@ -153,21 +171,21 @@ impl EventTeller {
 
     fn tell_pairs(&mut self, step: &FastStep, out: &mut EventSender) {
         let manipulation = step.objects.manipulation();
-        if let Some(slow) = &mut self.slow {
-            self.watch.take_from_slow(slow, out);
-            // Not all that are there: the life of a pair may come before the pair itself.
-            let has_gone =
-                |entity: u32| Some(self.gone.contains(&(manipulation.body_of(entity as usize)? as u32)));
-            if !self.gone.is_empty() {
-                self.watch
-                    .go_to_slow(slow, |entities| entities.into_iter().filter_map(has_gone).all(|gone| gone));
-            }
+        let stepped_s = step.objects.stepped_s();
+        self.watch.take_from_slow(out);
+        // Not all that are there: the life of a pair may come before the pair itself.
+        let has_gone =
+            |entity: u32| Some(self.gone.contains(&(manipulation.body_of(entity as usize)? as u32)));
+        if !self.gone.is_empty() {
+            let goes = |entities: [u32; 2]| entities.into_iter().filter_map(has_gone).all(|gone| gone);
+            self.watch.go_to_slow(stepped_s, goes);
         }
         let pairs = manipulation
             .pair_forces()
             .map(|(entities, force_W)| PairForce { entities: entities.map(|entity| entity as u32), force_W });
-        let rests = |entities: [u32; 2]| manipulation.rest_together(entities.map(|entity| entity as usize));
-        self.watch.pairs(pairs, step.objects.stepped_s(), rests, out);
+        let standing =
+            |entities: [u32; 2]| manipulation.pair_standing(entities.map(|entity| entity as usize)).into();
+        self.watch.pairs(pairs, stepped_s, standing, out);
     }
 
     /// Looks for who has been handed over only if anybody was.

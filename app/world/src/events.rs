@@ -33,4 +33,4 @@ pub use bus::{EventReceiver, EventSender, Hub, Subscriber, event_queue, growing_
 pub use event::{Change, Class, Event, Facts, Kind, Life, List, Why};
 pub use filter::Filter;
 pub use slow_pairs::{FastPairs, SlowPairs, pair_link};
-pub use watch::{MOST_TOLD, PairForce, QUIET_S, Touching, Watch};
+pub use watch::{MOST_TOLD, PairForce, PairStanding, QUIET_S, Touching, Watch};

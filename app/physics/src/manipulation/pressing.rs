@@ -5,6 +5,19 @@ use nalgebra::Vector3;
 use super::Manipulation;
 use crate::roster::Standing;
 
+/// Stepping of two entities, by which what they do to each other can change.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum PairStanding {
+    /// One of them is awake, or neither ever will be.
+    Stepped,
+    /// One of them sleeps, and none is awake: what they did to each other, they still do.
+    Asleep,
+    /// One of them waits for its turn, and none is awake: time stands still for it.
+    Waiting,
+    /// One of them is elsewhere or on its way, and none is awake.
+    Away,
+}
+
 impl Manipulation {
     /// The entities of which at least one was awake and which touched in the last tick, and the force on the first of the
     /// two \[N\]: in the order of bodies, the first being the body of the lower number.
@@ -12,14 +25,20 @@ impl Manipulation {
         self.pairs.iter_awake().map(|(_, pair)| (pair.entities, pair.force_W(&self.room.rows)))
     }
 
-    /// True if nobody steps these two at the time because at least one of them sleeps, or waits for its turn: what they did to
-    /// each other, they still do.
-    pub fn rest_together(&self, entities: [usize; 2]) -> bool {
-        let mut standings =
-            entities.into_iter().filter_map(|entity| self.body_of(entity)).map(|body| self.standing(body));
-        let [first, second] = [standings.next(), standings.next()];
-        let is_asleep = |standing| matches!(standing, Some(Standing::Asleep | Standing::Held));
-        let is_awake = |standing| standing == Some(Standing::Awake);
-        (is_asleep(first) || is_asleep(second)) && !is_awake(first) && !is_awake(second)
+    /// How these two are stepped at the time, of which the last tick may tell no force.
+    pub fn pair_standing(&self, entities: [usize; 2]) -> PairStanding {
+        let standings = entities.map(|entity| Some(self.standing(self.body_of(entity)?)));
+        let is_any = |of: fn(Standing) -> bool| standings.into_iter().flatten().any(of);
+        if is_any(|standing| standing == Standing::Awake) {
+            PairStanding::Stepped
+        } else if is_any(Standing::is_away) {
+            PairStanding::Away
+        } else if is_any(|standing| standing == Standing::Held) {
+            PairStanding::Waiting
+        } else if is_any(|standing| standing == Standing::Asleep) {
+            PairStanding::Asleep
+        } else {
+            PairStanding::Stepped
+        }
     }
 }

@@ -2,11 +2,13 @@
 //!
 //! Model: on a clock that waits a queue grows and nothing is lost ([`growing_event_queue`]); in real time it has so many places.
 //! Invariants: sending into places takes a bounded time, without lock or allocation; nothing waits for a subscriber that is slow.
-//! Events of one sender arrive in order; what is missing is told where it is missing.
+//! Events of one sender arrive in order; what is missing is told where it is missing. What would be too many at once for the
+//! sender is sent as a whole ([`Unfold`]), and becomes events at the other end, in its place.
 
 use super::{Class, Event, Filter, Kind};
 use rtrb::{Consumer, Producer, RingBuffer};
 use std::collections::VecDeque;
+use std::fmt::Debug;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
@@ -23,25 +25,50 @@ pub struct EventSender {
 #[derive(Debug)]
 pub struct EventReceiver {
     queue: Receiving,
+    /// What came as a whole, as far as it has not been taken.
+    unfolded: VecDeque<Event>,
     lost: Arc<AtomicU64>,
 }
 
 #[derive(Debug)]
 enum Sending {
-    Places(Producer<Event>),
+    Places(Producer<Item>),
     Growing(Growing),
 }
 
 #[derive(Debug)]
 enum Receiving {
-    Places(Consumer<Event>),
+    Places(Consumer<Item>),
     Growing(Growing),
 }
 
-/// Both ends have it.
-type Growing = Arc<Mutex<VecDeque<Event>>>;
+/// Events that are made where they are received: more than a real-time thread has time for.
+pub(super) trait Unfold: Send + Debug {
+    /// All of them, which are of this tick of the run.
+    fn unfold(self: Box<Self>, run_tick: u64) -> Vec<Event>;
+}
 
-fn held(events: &Growing) -> MutexGuard<'_, VecDeque<Event>> {
+/// What is on its way.
+#[derive(Debug)]
+enum Item {
+    One(Event),
+    /// So many as it will be, of this tick of the run.
+    Whole(u64, Box<dyn Unfold>),
+}
+
+impl Item {
+    fn run_tick(&self) -> u64 {
+        match self {
+            Self::One(event) => event.run_tick,
+            Self::Whole(run_tick, _) => *run_tick,
+        }
+    }
+}
+
+/// Both ends have it.
+type Growing = Arc<Mutex<VecDeque<Item>>>;
+
+fn held(events: &Growing) -> MutexGuard<'_, VecDeque<Item>> {
     events.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
@@ -49,7 +76,7 @@ fn held(events: &Growing) -> MutexGuard<'_, VecDeque<Event>> {
 pub fn event_queue(places: usize) -> (EventSender, EventReceiver) {
     let (mut queue, mut end) = RingBuffer::new(places.max(2));
     // Each place is written to once: the first touch of a page would otherwise be a fault of the fast thread.
-    while queue.push(Event { run_tick: 0, kind: Kind::Reset }).is_ok() {}
+    while queue.push(Item::One(Event { run_tick: 0, kind: Kind::Reset })).is_ok() {}
     while end.pop().is_ok() {}
     ends(Sending::Places(queue), Receiving::Places(end))
 }
@@ -63,32 +90,52 @@ pub fn growing_event_queue(places: usize) -> (EventSender, EventReceiver) {
 fn ends(sending: Sending, receiving: Receiving) -> (EventSender, EventReceiver) {
     let lost = Arc::new(AtomicU64::new(0));
     let sender = EventSender { queue: sending, untold: 0, lost: Arc::clone(&lost) };
-    (sender, EventReceiver { queue: receiving, lost })
+    (sender, EventReceiver { queue: receiving, unfolded: VecDeque::new(), lost })
 }
 
 impl EventSender {
     /// Sends; `false`, and counted, if there is no room.
     pub fn send(&mut self, event: Event) -> bool {
+        let has_room = self.has_room(event.run_tick);
+        if has_room {
+            self.push(Item::One(event));
+        } else {
+            self.lose();
+        }
+        has_room
+    }
+
+    /// Sends what will be events of this tick of the run at the other end; it comes back if there is no room.
+    pub(super) fn send_whole<T: Unfold + 'static>(
+        &mut self,
+        run_tick: u64,
+        whole: Box<T>,
+    ) -> Result<(), Box<T>> {
+        if !self.has_room(run_tick) {
+            return Err(whole);
+        }
+        self.push(Item::Whole(run_tick, whole));
+        Ok(())
+    }
+
+    /// Whether one more finds room, behind what is missing before it, which is told.
+    fn has_room(&mut self, run_tick: u64) -> bool {
         let needed = if self.untold > 0 { 2 } else { 1 };
         if self.slots() < needed {
-            self.lose();
             return false;
         }
         if self.untold > 0 {
             let kind = Kind::Lost { count: std::mem::take(&mut self.untold) };
-            // There is room for both.
-            self.push(Event { run_tick: event.run_tick, kind });
+            self.push(Item::One(Event { run_tick, kind }));
         }
-        self.push(event)
+        true
     }
 
-    fn push(&mut self, event: Event) -> bool {
+    /// There is room.
+    fn push(&mut self, item: Item) {
         match &mut self.queue {
-            Sending::Places(queue) => queue.push(event).is_ok(),
-            Sending::Growing(events) => {
-                held(events).push_back(event);
-                true
-            }
+            Sending::Places(queue) => drop(queue.push(item)),
+            Sending::Growing(events) => held(events).push_back(item),
         }
     }
 
@@ -106,8 +153,13 @@ impl EventSender {
 
     /// Counts an event that is not sent.
     pub fn lose(&mut self) {
-        self.untold += 1;
-        self.lost.fetch_add(1, Ordering::Relaxed);
+        self.lose_all(1);
+    }
+
+    /// Counts so many.
+    pub(super) fn lose_all(&mut self, count: u64) {
+        self.untold += count;
+        self.lost.fetch_add(count, Ordering::Relaxed);
     }
 
     /// Whether another event might find no room.
@@ -127,7 +179,19 @@ impl EventSender {
 impl EventReceiver {
     /// The next event, if it is not of a later tick than this.
     pub fn receive(&mut self, up_to: u64) -> Option<Event> {
-        let is_due = |event: &Event| event.run_tick <= up_to;
+        loop {
+            if let Some(event) = self.unfolded.front() {
+                return if event.run_tick <= up_to { self.unfolded.pop_front() } else { None };
+            }
+            match self.take(up_to)? {
+                Item::One(event) => return Some(event),
+                Item::Whole(run_tick, whole) => self.unfolded.extend(whole.unfold(run_tick)),
+            }
+        }
+    }
+
+    fn take(&mut self, up_to: u64) -> Option<Item> {
+        let is_due = |item: &Item| item.run_tick() <= up_to;
         match &mut self.queue {
             Receiving::Places(queue) => is_due(queue.peek().ok()?).then(|| queue.pop().ok())?,
             Receiving::Growing(events) => {

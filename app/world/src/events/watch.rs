@@ -2,24 +2,27 @@
 //!
 //! Model: whoever steps tells, tick by tick, which fingers touch what ([`Watch::finger`]) and which entities press each other
 //! ([`Watch::pairs`]); what differs from the tick before is sent. A finger's contact begins, slips and ends in the tick in
-//! which rendering says so. A pair's begins with its first force and ends after [`QUIET_S`] without any, so that a box that
-//! settles does not chatter; while both rest, asleep, it goes on. The same holds for grasps.
+//! which rendering says so; what slips when it ends has first stopped to slip. A pair's begins with its first force and ends after
+//! [`QUIET_S`] without any, so that a box that settles does not chatter; while both rest, asleep, it goes on. The same holds
+//! for grasps. When a world ends, all that it has begun does, in that tick.
 //!
 //! Invariants: no allocation after `new`; in a tick at most [`MOST_TOLD`] events, more are counted as lost, and so is a
 //! finger's contact without room. A pair or a grasp that finds no room is not watched. Where the sender's queue grows, so do the
-//! room for pairs and the number of events.
-//! Cost: linear in what touches, beside searches in what is sorted.
+//! room for pairs and the number of events. A world that ends may have any number of contacts, in either list: its watch is
+//! sent as a whole, and its last events are made where they are received.
+//! Cost: linear in what touches, beside searches in what is sorted; of an end, constant.
 
 mod fingers;
 mod grasps;
 mod pairs;
 
+use super::bus::Unfold;
 use super::slow_pairs::{FastPairs, FromSlow};
-use super::{Event, EventSender, Kind, Life};
+use super::{Event, EventSender, Kind, Life, growing_event_queue};
 use fingers::FingerWatch;
 use grasps::Grasps;
 use nalgebra::Vector3;
-pub(super) use pairs::{PairLife, Pairs};
+pub(super) use pairs::{Pair, Pairs};
 
 /// The most events that a tick sends, unless the queue grows.
 pub const MOST_TOLD: usize = 256;
@@ -48,12 +51,38 @@ pub struct PairForce {
     pub force_W: Vector3<f64>,
 }
 
-/// What was so in the tick before.
-#[derive(Debug)]
+/// Stepping of two entities, as far as what they do to each other can change by it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum PairStanding {
+    /// One of them is stepped, or neither can move.
+    Stepped,
+    /// Nobody steps them, since they rest.
+    Asleep,
+    /// One of them waits for its turn: time stands still for it.
+    Waiting,
+    /// Another list has one of them, or it is on its way.
+    Away,
+}
+
+impl From<physics::PairStanding> for PairStanding {
+    fn from(standing: physics::PairStanding) -> Self {
+        match standing {
+            physics::PairStanding::Stepped => Self::Stepped,
+            physics::PairStanding::Asleep => Self::Asleep,
+            physics::PairStanding::Waiting => Self::Waiting,
+            physics::PairStanding::Away => Self::Away,
+        }
+    }
+}
+
+/// What was so in the tick before; without any finger or pair at first, if it is none of a world.
+#[derive(Debug, Default)]
 pub struct Watch {
     fingers: Vec<FingerWatch>,
     pairs: Pairs,
     grasps: Grasps,
+    /// Where pairs of the slow list are watched, if there is one.
+    slow: Option<FastPairs>,
     last_tick: Option<u64>,
     now: Now,
 }
@@ -77,9 +106,16 @@ impl Watch {
             fingers: (0..fingers).map(|_| FingerWatch::new(most_touched)).collect(),
             pairs: Pairs::with_capacity(pairs),
             grasps: Grasps::new(),
+            slow: None,
             last_tick: None,
             now: Now { period_s, ..Now::default() },
         }
+    }
+
+    /// Beside a slow list, if there is one.
+    #[must_use]
+    pub fn with_slow(self, slow: Option<FastPairs>) -> Self {
+        Self { slow, ..self }
     }
 
     /// Begins a tick of the run; before it all that is told was so in the one before.
@@ -106,36 +142,40 @@ impl Watch {
         }
     }
 
-    /// Which entities press each other, in a step of this length (s). `rests`: whether two that do not are asleep.
+    /// Which entities press each other, in a step of this length (s). `standing`: why two others may not.
     pub fn pairs(
         &mut self,
         pairs: impl Iterator<Item = PairForce>,
         dt_s: f64,
-        rests: impl Fn([u32; 2]) -> bool,
+        standing: impl Fn([u32; 2]) -> PairStanding,
         out: &mut EventSender,
     ) {
-        self.pairs.look(pairs, dt_s, rests, &mut Teller { now: &mut self.now, out });
+        self.pairs.look(pairs, dt_s, standing, &mut Teller { now: &mut self.now, out });
     }
 
     /// Before [`Self::pairs`], where there is a slow list: takes up the pairs that come from there and what happened to those
     /// that are there, which is told in this tick.
-    pub fn take_from_slow(&mut self, slow: &mut FastPairs, out: &mut EventSender) {
+    pub fn take_from_slow(&mut self, out: &mut EventSender) {
         let most = if out.grows() { usize::MAX } else { MOST_TOLD };
         for _ in 0..most {
-            match slow.from_slow.pop() {
-                Ok(FromSlow::Life(life)) => {
-                    self.pairs.adopt(&life.seen_in(self.now.run_tick), out.grows());
-                }
-                Ok(FromSlow::Happened(kind)) => self.tell(kind, out),
-                Err(_) => break,
-            }
+            let Some(Ok(next)) = self.slow.as_mut().map(|slow| slow.from_slow.pop()) else { break };
+            self.take(next, out);
         }
     }
 
-    /// The pairs that go to the slow list.
-    pub fn go_to_slow(&mut self, slow: &mut FastPairs, goes: impl Fn([u32; 2]) -> bool) {
-        let to_slow = &mut slow.to_slow;
-        self.pairs.give_away(goes, |life| to_slow.push(life).is_ok());
+    fn take(&mut self, next: FromSlow, out: &mut EventSender) {
+        match next {
+            FromSlow::Goes(pair) => self.pairs.adopt(&pair.seen_in(self.now.run_tick), out.grows()),
+            FromSlow::Happened(kind) => self.tell(kind, out),
+        }
+    }
+
+    /// The pairs that have gone to the slow list after a step of this length (s). Nobody knows their forces in it any more: they
+    /// are taken to be those of the step before.
+    pub fn go_to_slow(&mut self, dt_s: f64, goes: impl Fn([u32; 2]) -> bool) {
+        let Self { pairs, slow: Some(slow), now, .. } = self else { return };
+        let (run_tick, period_s) = (now.run_tick, now.period_s);
+        pairs.give_away(goes, |pair| slow.to_slow.push(pair.once_more(dt_s, run_tick, period_s)).is_ok());
     }
 
     /// After all fingers: who holds what.
@@ -143,25 +183,65 @@ impl Watch {
         self.grasps.look(&self.fingers, &mut Teller { now: &mut self.now, out });
     }
 
-    /// The world ends: with it all that touches, is held or tied. `next` watches the one that follows; what devices do goes on.
-    pub fn end(&mut self, next: &mut Self, out: &mut EventSender) {
-        let mut teller = Teller { now: &mut self.now, out };
-        for (number, finger) in self.fingers.iter_mut().enumerate() {
-            let buttons = finger.buttons();
-            finger.look(number as u32, &[], &mut teller);
-            finger.look_at_device(number as u32, buttons, None, &mut teller);
-            if let Some(next) = next.fingers.get_mut(number) {
-                next.go_on_from(buttons);
-            }
+    /// Before it ends: `next` watches the world that follows, and what devices do goes on.
+    pub fn hand_on(&self, next: &mut Self) {
+        for (finger, next) in self.fingers.iter().zip(&mut next.fingers) {
+            next.go_on_from(finger.buttons());
         }
-        self.pairs.end(&mut teller);
-        self.grasps.end(&mut teller);
         next.last_tick = self.last_tick;
+    }
+
+    /// The world ends in this tick of the run: with it all that touches, is held or tied, in both lists. The watch comes back if
+    /// there is no room for it, and what it knows to be lost is counted.
+    ///
+    /// # Errors
+    /// The watch.
+    pub fn end(self: Box<Self>, run_tick: u64, out: &mut EventSender) -> Result<(), Box<Self>> {
+        out.send_whole(run_tick, self).inspect_err(|watch| {
+            let of_fingers: usize = watch.fingers.iter().map(FingerWatch::open).sum();
+            out.lose_all((of_fingers + watch.pairs.open() + watch.grasps.open()) as u64);
+        })
+    }
+
+    /// The tick that was looked at last.
+    pub fn last_tick(&self) -> Option<u64> {
+        self.last_tick
     }
 
     /// Something that the caller has found.
     pub fn tell(&mut self, kind: Kind, out: &mut EventSender) {
         Teller { now: &mut self.now, out }.tell(kind);
+    }
+}
+
+impl Unfold for Watch {
+    fn unfold(mut self: Box<Self>, run_tick: u64) -> Vec<Event> {
+        let (mut out, mut told) = growing_event_queue(0);
+        self.begin(run_tick);
+        let mut teller = Teller { now: &mut self.now, out: &mut out };
+        for (number, finger) in (0..).zip(&mut self.fingers) {
+            let buttons = finger.buttons();
+            finger.look(number, &[], &mut teller);
+            finger.look_at_device(number, buttons, None, &mut teller);
+        }
+        self.grasps.end(&mut teller);
+        self.end_pairs(&mut out);
+        std::iter::from_fn(|| told.receive(u64::MAX)).collect()
+    }
+}
+
+impl Watch {
+    /// First those of the slow list, some of which may be on their way to here.
+    fn end_pairs(&mut self, out: &mut EventSender) {
+        if let Some(mut slow) = self.slow.take() {
+            let mut last = slow.end();
+            while let Ok(next) = slow.from_slow.pop() {
+                self.take(next, out);
+            }
+            last.told.drain(..).for_each(|next| self.take(next, out));
+            last.pairs.end(&mut Teller { now: &mut self.now, out });
+        }
+        self.pairs.end(&mut Teller { now: &mut self.now, out });
     }
 }
 

@@ -4,7 +4,7 @@ use haptics::Entity;
 use physics::{Made, Manipulation, Standing};
 
 use super::link::{Came, Claim, Most, SlowEnd, Stand, send, take_in};
-use crate::events::{Kind, PairForce, SlowPairs};
+use crate::events::{Kind, PairForce, PairStanding, SlowPairs};
 
 /// The slow list.
 pub struct SlowList {
@@ -72,7 +72,7 @@ impl SlowList {
             return ticks;
         }
         self.take_in();
-        if let Some(watch) = &mut self.watch {
+        if let Some(watch) = &self.watch {
             watch.begin_turn();
         }
         self.give_away();
@@ -80,6 +80,7 @@ impl SlowList {
         for tick in 0..ticks {
             if self.is_paused || (self.manipulation.awake().is_empty() && self.manipulation.held() == 0) {
                 whole += ticks - tick;
+                self.rest(ticks - tick, dt_s);
                 break;
             }
             if !goes_on(&mut self.manipulation, made.as_ref()) {
@@ -135,15 +136,21 @@ impl SlowList {
 
     /// After a tick of this length (s), in which so many bodies were parked.
     fn look(&mut self, parked: usize, dt_s: f64) {
-        let (Some(watch), manipulation) = (&mut self.watch, &self.manipulation) else { return };
+        let (Some(watch), manipulation) = (&self.watch, &self.manipulation) else { return };
         let pairs = manipulation
             .pair_forces()
             .map(|(entities, force_W)| PairForce { entities: entities.map(|entity| entity as u32), force_W });
-        let rests = |entities: [u32; 2]| manipulation.rest_together(entities.map(|entity| entity as usize));
-        watch.look(pairs, dt_s, rests);
+        watch.look(pairs, (1, dt_s), |entities| pair_standing(manipulation, entities));
         let all = manipulation.parked();
         for parked in &all[all.len().saturating_sub(parked)..] {
             watch.tell(Kind::Parked { entity: parked.entity as u32, why: parked.why.into() });
+        }
+    }
+
+    /// After so many ticks of this length (s) in which nobody was awake. In a pause none passes.
+    fn rest(&self, ticks: u32, dt_s: f64) {
+        if let (Some(watch), manipulation, false) = (&self.watch, &self.manipulation, self.is_paused) {
+            watch.look(std::iter::empty(), (ticks, dt_s), |entities| pair_standing(manipulation, entities));
         }
     }
 
@@ -228,4 +235,8 @@ impl SlowList {
             waits
         });
     }
+}
+
+fn pair_standing(manipulation: &Manipulation, entities: [u32; 2]) -> PairStanding {
+    manipulation.pair_standing(entities.map(|entity| entity as usize)).into()
 }

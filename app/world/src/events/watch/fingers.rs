@@ -37,6 +37,12 @@ impl FingerWatch {
         self.buttons
     }
 
+    /// How much of it has begun and not ended.
+    pub(super) fn open(&self) -> usize {
+        let slips = self.touched.iter().filter(|touched| touched.slips).count();
+        self.touched.len() + slips + usize::from(self.tied.is_some())
+    }
+
     /// They were already.
     pub(super) fn go_on_from(&mut self, buttons: u64) {
         self.buttons = buttons;
@@ -47,7 +53,7 @@ impl FingerWatch {
         self.touched.retain(|was| {
             let stays = touching.binary_search_by_key(&was.entity, |is| is.entity).is_ok();
             if !stays {
-                was.tell(finger, Change::Ends, teller);
+                was.end(finger, teller);
             }
             stays
         });
@@ -99,6 +105,14 @@ impl FingerWatch {
 }
 
 impl Touched {
+    /// Nothing slides any more that does not touch.
+    fn end(&self, finger: u32, teller: &mut Teller<'_>) {
+        if self.slips {
+            self.tell(finger, Change::Sticks, teller);
+        }
+        self.tell(finger, Change::Ends, teller);
+    }
+
     fn tell(&self, finger: u32, change: Change, teller: &mut Teller<'_>) {
         teller.tell(Kind::FingerTouch { finger, entity: self.entity, change, life: self.life });
     }

@@ -7,7 +7,7 @@ use crate::events::Kind;
 /// Entities that are held at once; each needs a finger at least, and a finger touches few.
 const MOST: usize = 32;
 
-#[derive(Debug)]
+#[derive(Debug, Default)]
 pub(super) struct Grasps {
     held: Vec<Held>,
     /// Entities in touch with fingers, and bit `i`: with finger `i`.
@@ -57,6 +57,11 @@ impl Grasps {
             }
             stays
         });
+    }
+
+    /// How many there are.
+    pub(super) fn open(&self) -> usize {
+        self.held.len()
     }
 
     /// All are let go.

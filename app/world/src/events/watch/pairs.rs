@@ -1,52 +1,87 @@
 //! Contacts between entities.
+//!
+//! Model: while two sleep in touch, what they did to each other in the last tick before goes on: that was the force of their
+//! rest, or none if they had just parted. Who waits for its turn has no time meanwhile, and nothing is added.
 
-use super::{Life, PairForce, QUIET_S, Teller};
+use super::{Life, PairForce, PairStanding, QUIET_S, Teller};
 use crate::events::{Change, Kind};
 use nalgebra::Vector3;
 
 /// Pairs that touch, in ascending order.
-#[derive(Debug)]
+#[derive(Debug, Default)]
 pub(in crate::events) struct Pairs {
     touching: Vec<Pair>,
     most: usize,
 }
 
-#[derive(Debug, Clone, Copy)]
-struct Pair {
-    entities: [u32; 2],
-    life: Life,
-    /// Its last tick with a force.
+/// A contact; as such it goes over to the other side when its island does.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(in crate::events) struct Pair {
+    pub(in crate::events) entities: [u32; 2],
+    pub(in crate::events) life: Life,
+    /// The force in the tick that was looked at last.
+    force_W: Vector3<f64>,
+    /// Its last tick with a force, as this side counts.
     pressed: u64,
     /// For how long it has had none, awake (s).
     quiet_s: f64,
+    /// It came from the other side, and its bodies may still be on their way.
+    is_coming: bool,
 }
 
-/// A contact that goes on on the other side.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(in crate::events) struct PairLife {
-    pub(in crate::events) entities: [u32; 2],
-    pub(in crate::events) life: Life,
-    quiet_s: f64,
-    /// Its last tick with a force, as that side counts.
-    pressed: u64,
-}
-
-impl PairLife {
-    /// As a side knows it whose tick this is.
+impl Pair {
+    /// As a side knows it that takes it up in this tick.
     pub(in crate::events) fn seen_in(self, run_tick: u64) -> Self {
-        Self { pressed: run_tick, ..self }
+        Self { pressed: run_tick, is_coming: true, ..self }
+    }
+
+    /// After another tick of this length (s) with the same force, and no other than this side's last one.
+    pub(super) fn once_more(mut self, dt_s: f64, run_tick: u64, period_s: f64) -> Self {
+        if self.force_W != Vector3::zeros() {
+            let since_s = run_tick.saturating_sub(self.pressed) as f64 * period_s;
+            self.press(&self.force_W.clone(), dt_s, since_s, run_tick);
+        }
+        self
+    }
+
+    /// What it was before, too.
+    pub(in crate::events) fn after(self, before: &Self) -> Self {
+        Self { life: before.life.followed_by(&self.life), ..self }
+    }
+
+    fn press(&mut self, force_W: &Vector3<f64>, dt_s: f64, since_s: f64, run_tick: u64) {
+        self.life.go_on(force_W, dt_s, since_s);
+        (self.force_W, self.pressed, self.quiet_s, self.is_coming) = (*force_W, run_tick, 0.0, false);
+    }
+
+    /// A tick in which nobody says that it presses; whether it goes on.
+    fn go_on(&mut self, standing: PairStanding, dt_s: f64, since_s: f64, run_tick: u64) -> bool {
+        match standing {
+            PairStanding::Asleep if self.force_W != Vector3::zeros() => {
+                self.press(&self.force_W.clone(), dt_s, since_s, run_tick);
+            }
+            PairStanding::Asleep | PairStanding::Waiting => self.quiet_s = 0.0,
+            PairStanding::Away if self.is_coming => return true,
+            PairStanding::Stepped | PairStanding::Away => {
+                self.force_W = Vector3::zeros();
+                self.quiet_s += dt_s;
+            }
+        }
+        self.is_coming = false;
+        self.quiet_s < QUIET_S
+    }
+
+    fn tell(&self, change: Change, teller: &mut Teller<'_>) {
+        teller.tell(Kind::PairTouch { entities: self.entities, change, life: self.life });
     }
 }
 
 impl Pairs {
     /// Takes up one that the other side has watched until now, if there is room or there may be more.
-    pub(in crate::events) fn adopt(&mut self, from: &PairLife, grows: bool) {
-        let PairLife { entities, life, quiet_s, pressed } = *from;
-        match self.touching.binary_search_by_key(&entities, |pair| pair.entities) {
-            Ok(at) => self.touching[at].life = life.followed_by(&self.touching[at].life),
-            Err(at) if grows || self.touching.len() < self.most => {
-                self.touching.insert(at, Pair { entities, life, pressed, quiet_s });
-            }
+    pub(in crate::events) fn adopt(&mut self, from: &Pair, grows: bool) {
+        match self.touching.binary_search_by_key(&from.entities, |pair| pair.entities) {
+            Ok(at) => self.touching[at] = self.touching[at].after(from),
+            Err(at) if grows || self.touching.len() < self.most => self.touching.insert(at, *from),
             Err(_) => {}
         }
     }
@@ -55,12 +90,9 @@ impl Pairs {
     pub(in crate::events) fn give_away(
         &mut self,
         goes: impl Fn([u32; 2]) -> bool,
-        mut give: impl FnMut(PairLife) -> bool,
+        mut give: impl FnMut(Pair) -> bool,
     ) {
-        self.touching.retain(|pair| {
-            let Pair { entities, life, quiet_s, pressed } = *pair;
-            !(goes(entities) && give(PairLife { entities, life, quiet_s, pressed }))
-        });
+        self.touching.retain(|pair| !(goes(pair.entities) && give(*pair)));
     }
 
     pub(in crate::events) fn with_capacity(most: usize) -> Self {
@@ -71,7 +103,7 @@ impl Pairs {
         &mut self,
         pairs: impl Iterator<Item = PairForce>,
         dt_s: f64,
-        rests: impl Fn([u32; 2]) -> bool,
+        standing: impl Fn([u32; 2]) -> PairStanding,
         teller: &mut Teller<'_>,
     ) {
         let mut hint = 0;
@@ -80,11 +112,11 @@ impl Pairs {
         }
         let now = teller.now.run_tick;
         self.touching.retain_mut(|pair| {
-            if pair.pressed == now {
+            if pair.pressed == now && !pair.is_coming {
                 return true;
             }
-            pair.quiet_s = if rests(pair.entities) { 0.0 } else { pair.quiet_s + dt_s };
-            let stays = pair.quiet_s < QUIET_S;
+            let since_s = teller.time_s(now.saturating_sub(pair.pressed));
+            let stays = pair.go_on(standing(pair.entities), dt_s, since_s, now);
             if !stays {
                 pair.tell(Change::Ends, teller);
             }
@@ -92,8 +124,13 @@ impl Pairs {
         });
     }
 
+    /// How many there are.
+    pub(super) fn open(&self) -> usize {
+        self.touching.len()
+    }
+
     /// All of them end.
-    pub(super) fn end(&mut self, teller: &mut Teller<'_>) {
+    pub(in crate::events) fn end(&mut self, teller: &mut Teller<'_>) {
         for pair in self.touching.drain(..) {
             pair.tell(Change::Ends, teller);
         }
@@ -110,25 +147,24 @@ impl Pairs {
         match found {
             Ok(at) => {
                 let since_s = teller.time_s(now.saturating_sub(self.touching[at].pressed));
-                let known = &mut self.touching[at];
-                known.life.go_on(&force_W, dt_s, since_s);
-                (known.pressed, known.quiet_s) = (now, 0.0);
+                self.touching[at].press(&force_W, dt_s, since_s, now);
                 at + 1
             }
             Err(at) if teller.grows() || self.touching.len() < self.most => {
-                let mut begun = Pair { entities, life: Life::default(), pressed: now, quiet_s: 0.0 };
-                begun.life.go_on(&force_W, dt_s, dt_s);
+                let mut begun = Pair {
+                    entities,
+                    life: Life::default(),
+                    force_W,
+                    pressed: now,
+                    quiet_s: 0.0,
+                    is_coming: false,
+                };
+                begun.press(&force_W, dt_s, dt_s, now);
                 begun.tell(Change::Begins, teller);
                 self.touching.insert(at, begun);
                 at + 1
             }
             Err(at) => at,
         }
-    }
-}
-
-impl Pair {
-    fn tell(&self, change: Change, teller: &mut Teller<'_>) {
-        teller.tell(Kind::PairTouch { entities: self.entities, change, life: self.life });
     }
 }
