@@ -238,6 +238,30 @@ mod tests {
         assert!(line.contains(&told), "{line}");
     }
 
+    /// The row of a tick comes behind all of its events.
+    #[test]
+    fn on_a_clock_that_waits_no_event_of_a_tick_is_lost_however_many_it_has() {
+        let directory = tempfile::tempdir().expect("a directory");
+        let path = directory.path().join("events.jsonl");
+        let opened = Opened::recording(&path).expect("opened");
+        let events = EventsFile::create(opened, Names::default(), PERIOD_NS, Book::default());
+        let file = RecordFile::Events(Box::new(events.expect("a file")));
+        let how = Backpressure::new(WhenFull::Wait, &StopSignals::default());
+        let how = Backpressure { patience: Duration::from_secs(2), ..how };
+        let mut recorder = Recorder::start(&path, file, 0, PERIOD_NS, how).expect("a thread");
+        let mut feed = recorder.take_events().expect("nobody has taken it");
+        let (in_a_tick, ticks) = (20_000, 3);
+        for run_tick in 0..ticks {
+            (0..in_a_tick).for_each(|_| feed.event(&Event { run_tick, kind: Kind::Reset }));
+            recorder.send(&Row { run_tick, ..Row::empty() }, &[]);
+        }
+        let Recorded { rows, lost, failure, .. } = recorder.finish();
+        assert_eq!((rows, lost, failure), (ticks * in_a_tick, 0, None));
+        let text = std::fs::read_to_string(&path).expect("events");
+        let ticks_told = text.lines().map(|line| line.split([':', ',']).nth(1).expect("a tick").to_owned());
+        assert!(ticks_told.eq((0..ticks).flat_map(|tick| (0..in_a_tick).map(move |_| tick.to_string()))));
+    }
+
     #[test]
     fn a_reader_who_comes_back_too_late_finds_a_table_without_a_gap_and_the_recording_is_not_complete() {
         let directory = tempfile::tempdir().expect("a directory");

@@ -5,6 +5,8 @@
 //! ([`backpressure`](super::backpressure)). A disk that takes no more is told at once, and the rows that follow are thrown
 //! away: the run goes on. At the end the recorder has as long as it gets on; one that is stuck is given up. A reader of the
 //! standard output who has seen enough is no failure: the recording ends, and so may the run.
+//! Events are written behind the row of their tick, which is handed over behind them: where they fill their queue and no row
+//! is there, the recorder takes them in, however many they are, or both ends would wait for each other.
 //! Everything before the first row is written here, too, if it may have to wait for a reader.
 //! Invariants: on a clock that waits, a recording that lacks a row lacks all behind it, and says so. A thread that was left
 //! behind replaces no earlier content any more, which has been told as kept.
@@ -26,12 +28,14 @@ use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::thread::{JoinHandle, Thread};
 use std::time::{Duration, Instant};
-use world::events::{Event, EventReceiver, EventSender, Subscriber, event_queue};
+use world::events::{Event, EventReceiver, EventSender, Subscriber, growing_event_queue};
 
 /// Bodies that may wait, of all rows together.
 const MOST_BODIES: usize = 1 << 18;
-/// Events that may wait; more than a tick has.
+/// Events that may wait; whoever has more for it waits, too.
 const MOST_EVENTS: usize = 8192;
+/// In real time nobody waits: so many, since a world that ends may bring the ends of all that touched at once.
+const MOST_EVENTS_AT_ONCE: usize = 1 << 17;
 /// CSV goes to the file after so much of the run (ns), if not before.
 const FLUSH_NS: u64 = 500_000_000;
 /// How long the recorder sleeps when there is nothing to write.
@@ -75,6 +79,8 @@ impl Recorded {
 /// Hands events to a recording, as [`Recorder::send`] does rows.
 pub struct EventFeed {
     events: EventSender,
+    /// So many may wait.
+    most: usize,
     backpressure: Backpressure,
     shared: Arc<Shared>,
     thread: Thread,
@@ -89,11 +95,16 @@ impl Subscriber for EventFeed {
     fn event(&mut self, event: &Event) {
         let progress = &self.shared.progress;
         let mut wait = Wait::begin(progress);
-        while self.events.is_full()
+        while self.events.waiting() >= self.most
             && !self.events.is_abandoned()
             && wait.goes_on(progress, &self.backpressure, &self.thread)
         {}
-        let is_sent = !progress.is_given_up() && self.events.send(*event);
+        let is_sent = !progress.is_given_up() && self.events.waiting() < self.most;
+        if is_sent {
+            self.events.send(*event);
+        } else {
+            self.events.lose();
+        }
         let count = if is_sent { &self.shared.events_sent } else { &self.shared.events_lost };
         count.fetch_add(1, Ordering::Relaxed);
     }
@@ -165,10 +176,13 @@ impl Recorder {
         let shared = Arc::new(Shared::default());
         let content = file.content();
         let unit = if matches!(file, RecordFile::Events(_)) { EVENTS } else { "rows" };
-        let (events, event_ends) = event_queue(MOST_EVENTS);
+        let (events, event_ends) = growing_event_queue(MOST_EVENTS);
+        let waits = backpressure.when_full == WhenFull::Wait;
         let writer = RecorderThread {
             file: Some(file),
             events: event_ends,
+            taken_in: VecDeque::new(),
+            waits,
             shared: shared.clone(),
             content: Arc::clone(&content),
             period_ns,
@@ -180,6 +194,7 @@ impl Recorder {
         let (known, changed) = (vec![None; bodies], Vec::with_capacity(bodies));
         let events = Some(EventFeed {
             events,
+            most: if waits { MOST_EVENTS } else { MOST_EVENTS_AT_ONCE },
             backpressure: backpressure.clone(),
             shared: shared.clone(),
             thread: thread.thread().clone(),
@@ -459,6 +474,10 @@ struct RecorderThread {
     /// `None` once it failed.
     file: Option<RecordFile>,
     events: EventReceiver,
+    /// Events before those, whose row has not come yet.
+    taken_in: VecDeque<Event>,
+    /// Whether others wait for it.
+    waits: bool,
     shared: Arc<Shared>,
     content: Arc<ContentState>,
     period_ns: u64,
@@ -490,7 +509,9 @@ impl RecorderThread {
             if is_closing {
                 break;
             }
-            std::thread::park_timeout(PAUSE);
+            if !self.take_in_events() {
+                std::thread::park_timeout(PAUSE);
+            }
         }
         self.tell_lost(last, u64::MAX);
         if let Err(error) = self.write_events(u64::MAX) {
@@ -535,10 +556,29 @@ impl RecorderThread {
 
     /// Those up to this tick.
     fn write_events(&mut self, up_to: u64) -> Result<(), RecordingError> {
-        while let Some(event) = self.events.receive(up_to) {
+        while let Some(event) = self.next_event(up_to) {
             self.file.as_mut().map_or(Ok(()), |file| file.event(&event))?;
         }
         Ok(())
+    }
+
+    fn next_event(&mut self, up_to: u64) -> Option<Event> {
+        match self.taken_in.front() {
+            Some(event) if event.run_tick > up_to => None,
+            Some(_) => self.taken_in.pop_front(),
+            None => self.events.receive(up_to),
+        }
+    }
+
+    /// Without a row at hand: makes room for who waits until there is some for the next event, before that row. Says whether it
+    /// has made any.
+    fn take_in_events(&mut self) -> bool {
+        let is_needed = self.waits && self.events.waiting() >= MOST_EVENTS / 2;
+        if is_needed {
+            self.taken_in.extend(std::iter::from_fn(|| self.events.receive(u64::MAX)).take(MOST_EVENTS));
+            self.shared.progress.take();
+        }
+        is_needed
     }
 
     /// Tells of rows that are missing up to here.

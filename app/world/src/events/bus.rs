@@ -146,6 +146,14 @@ impl EventSender {
         }
     }
 
+    /// How many have been sent that nobody has taken yet.
+    pub fn waiting(&self) -> usize {
+        match &self.queue {
+            Sending::Places(queue) => queue.buffer().capacity() - queue.slots(),
+            Sending::Growing(events) => held(events).len(),
+        }
+    }
+
     /// True if it has room for whatever happens.
     pub(super) fn grows(&self) -> bool {
         matches!(self.queue, Sending::Growing(_))
@@ -199,6 +207,15 @@ impl EventReceiver {
                 if is_due(events.front()?) { events.pop_front() } else { None }
             }
         }
+    }
+
+    /// How many wait to be taken.
+    pub fn waiting(&self) -> usize {
+        let on_the_way = match &self.queue {
+            Receiving::Places(queue) => queue.slots(),
+            Receiving::Growing(events) => held(events).len(),
+        };
+        self.unfolded.len() + on_the_way
     }
 
     /// How many found no room so far.

@@ -5,8 +5,8 @@
 use nalgebra::Vector3;
 use std::sync::{Arc, Mutex};
 use world::events::{
-    Change, Class, Event, EventReceiver, EventSender, Filter, Hub, Kind, MOST_TOLD, PairForce, Touching,
-    Watch, event_queue,
+    Change, Class, Event, EventReceiver, EventSender, Filter, Hub, Kind, Life, MOST_TOLD, PairForce,
+    PairStanding, SlowPairs, Touching, Watch, event_queue, pair_link,
 };
 
 const PERIOD_S: f64 = 0.001;
@@ -47,9 +47,11 @@ fn contacts_and_slips_begin_and_end_in_order() {
             "2 slip-begin",
             "3 slip-end",
             "4 slip-begin",
+            "5 slip-end",
             "5 contact-end",
             "5 contact-begin",
             "5 slip-begin",
+            "6 slip-end",
             "6 contact-end",
         ]
     );
@@ -90,14 +92,23 @@ fn all_of_a_crowd_is_told_and_what_finds_no_room_is_counted() {
 
 /// What is told of a pair that presses with these forces (N) in consecutive ticks; asleep where there is none at all.
 fn pressed(forces_n: &[Option<f64>]) -> Vec<Event> {
+    pressed_or(PairStanding::Asleep, forces_n)
+}
+
+fn pressed_or(otherwise: PairStanding, forces_n: &[Option<f64>]) -> Vec<Event> {
     let (mut out, mut events) = event_queue(1024);
     let mut watch = Watch::new(0, 0, 4, PERIOD_S);
     for (run_tick, force_n) in (0..).zip(forces_n) {
         let pair = force_n.map(|force_n| PairForce { entities: [2, 0], force_W: Vector3::y() * force_n });
         watch.begin(run_tick);
-        watch.pairs(pair.into_iter(), PERIOD_S, |_| force_n.is_none(), &mut out);
+        let standing = |_| if force_n.is_none() { otherwise } else { PairStanding::Stepped };
+        watch.pairs(pair.into_iter(), PERIOD_S, standing, &mut out);
     }
     all(&mut events)
+}
+
+fn life(event: &Event) -> Life {
+    event.kind.facts().life.expect("a contact's life")
 }
 
 #[test]
@@ -115,6 +126,164 @@ fn a_pair_that_is_apart_for_less_than_five_milliseconds_still_touches() {
 fn a_pair_that_sleeps_still_touches() {
     let asleep: Vec<_> = [Some(2.0)].into_iter().chain([None; 50]).chain([Some(2.0)]).collect();
     assert_eq!(words(&pressed(&asleep)), ["0 pair-begin"]);
+}
+
+#[test]
+fn a_pair_that_sleeps_goes_on_with_the_force_of_its_rest() {
+    let apart = [Some(0.0); 5];
+    let asleep: Vec<_> = [Some(3.0), Some(2.0)].into_iter().chain([None; 50]).chain(apart).collect();
+    let told = pressed(&asleep);
+    assert_eq!(words(&told), ["0 pair-begin", "56 pair-end"]);
+    // 52 sums of numbers up to 0.1.
+    assert!(
+        (life(&told[1]).impulse_W.y - (3.0 + 51.0 * 2.0) * PERIOD_S).abs() < 1e-15,
+        "{:?}",
+        life(&told[1])
+    );
+    assert!((life(&told[1]).lasted_s - 52.0 * PERIOD_S).abs() < 1e-15);
+    assert_eq!((life(&told[1]).force_n, life(&told[1]).peak_n), (2.0, 3.0));
+}
+
+/// It fell asleep just apart, or waits for its turn as it was thrown.
+#[test]
+fn a_pair_whose_last_force_was_not_that_of_rest_gets_no_more_of_it() {
+    let asleep: Vec<_> =
+        [Some(30.0), Some(0.0)].into_iter().chain([None; 50]).chain([Some(0.0); 5]).collect();
+    let waits: Vec<_> = [Some(30.0)].into_iter().chain([None; 50]).chain([Some(0.0); 5]).collect();
+    for (standing, forces) in [(PairStanding::Asleep, asleep), (PairStanding::Waiting, waits)] {
+        let told = pressed_or(standing, &forces);
+        assert_eq!(words(&told)[0], "0 pair-begin");
+        assert_eq!((told.len(), life(&told[1]).impulse_W.y), (2, 30.0 * PERIOD_S), "{standing:?}");
+    }
+}
+
+fn pair(entity: u32, force_n: f64) -> PairForce {
+    PairForce { entities: [entity, 0], force_W: Vector3::y() * force_n }
+}
+
+/// So many ticks of the slow list, in which these press by a newton.
+fn slow_ticks(slow: &SlowPairs, ticks: u32, entities: std::ops::Range<u32>) {
+    for _ in 0..ticks {
+        let pairs = entities.clone().map(|entity| pair(entity, 1.0));
+        slow.look(pairs, (1, PERIOD_S), |_| PairStanding::Stepped);
+    }
+}
+
+#[test]
+fn when_a_world_ends_all_that_touched_in_either_list_has_ended_before() {
+    const SLOW: u32 = 3000;
+    let (link, slow) = pair_link();
+    let (mut out, mut events) = event_queue(8192);
+    let mut watch = Watch::new(2, 4, 2048, PERIOD_S).with_slow(Some(link));
+    let slides = [touching(3, 1.0, true)];
+    for run_tick in 0..40 {
+        if run_tick % 10 == 0 {
+            slow.begin_turn();
+            slow_ticks(&slow, 10, 10_000..10_000 + SLOW);
+        }
+        watch.begin(run_tick);
+        watch.finger(0, &slides, 1, Some(4), &mut out);
+        watch.finger(1, &slides, 0, None, &mut out);
+        watch.grasps(&mut out);
+        watch.take_from_slow(&mut out);
+        let pairs = (100..1100).map(|entity| pair(entity, 1.0));
+        watch.pairs(pairs, PERIOD_S, |_| PairStanding::Stepped, &mut out);
+    }
+    let lost = events.lost();
+    let mut next = Watch::new(2, 4, 2048, PERIOD_S);
+    watch.hand_on(&mut next);
+    Box::new(watch).end(40, &mut out).expect("room");
+    // It may go on until it hears of that.
+    slow.begin_turn();
+    slow_ticks(&slow, 10, 1..2);
+    out.send(Event { run_tick: 40, kind: Kind::Reset });
+    assert_eq!(events.lost(), lost, "an end takes one place");
+    let told = all(&mut events);
+    assert_eq!(words(&told).last().map(String::as_str), Some("40 reset"));
+    let mut open = std::collections::HashMap::new();
+    for event in &told {
+        let facts = event.kind.facts();
+        let is_of_contact = facts.word.starts_with("contact") || facts.word.starts_with("slip");
+        let what = if is_of_contact { facts.word.split('-').next().unwrap_or_default() } else { "" };
+        let count: &mut i32 =
+            open.entry((event.kind.class() as u32, what, facts.finger, facts.entity)).or_default();
+        match event.kind {
+            Kind::Reset | Kind::Lost { .. } | Kind::Button { .. } => {}
+            kind if kind.is_end() => *count -= 1,
+            _ => *count += 1,
+        }
+    }
+    // The beginnings of pairs of the fast list that had no room in their tick are counted as lost; their ends are told.
+    let wrong: Vec<_> = open.iter().filter(|(_, count)| **count > 0).collect();
+    assert!(wrong.is_empty(), "they did not end: {wrong:?}");
+    let ends = told.iter().filter(|event| event.run_tick == 40 && event.kind.class() == Class::Pair);
+    let of_slow = ends.filter(|event| event.kind.is_end() && event.kind.facts().entity >= Some(10_000));
+    let lives: Vec<Life> = of_slow.map(life).collect();
+    assert_eq!(lives.len(), SLOW as usize);
+    for life in lives {
+        // 40 sums of numbers up to 0.04.
+        assert!((life.impulse_W.y - 0.04).abs() < 1e-15 && (life.lasted_s - 0.04).abs() < 1e-15, "{life:?}");
+    }
+    // The button is still down.
+    next.begin(41);
+    next.finger(0, &[], 1, None, &mut out);
+    assert_eq!(words(&all(&mut events)), [""; 0]);
+}
+
+/// Its life arrives a turn late, when it has ended already.
+#[test]
+fn a_pair_that_ends_in_the_turn_in_which_it_went_over_ends_once() {
+    let (link, slow) = pair_link();
+    let (mut out, mut events) = event_queue(64);
+    let mut watch = Watch::new(0, 0, 4, PERIOD_S).with_slow(Some(link));
+    let look = |watch: &mut Watch, run_tick, force_n: Option<f64>, out: &mut EventSender| {
+        watch.begin(run_tick);
+        watch.take_from_slow(out);
+        if run_tick == 9 {
+            watch.go_to_slow(PERIOD_S, |_| true);
+        }
+        let pairs = force_n.map(|force_n| pair(7, force_n));
+        watch.pairs(pairs.into_iter(), PERIOD_S, |_| PairStanding::Stepped, out);
+    };
+    (0..9).for_each(|tick| look(&mut watch, tick, Some(1.0), &mut out));
+    // Who steps both begins a turn before the watch of the fast side has told who went.
+    slow.begin_turn();
+    slow_ticks(&slow, 3, 7..8);
+    slow_ticks(&slow, 7, 7..7);
+    look(&mut watch, 9, None, &mut out);
+    for turn in 1..4 {
+        slow.begin_turn();
+        slow_ticks(&slow, 10, 7..7);
+        look(&mut watch, 9 + 10 * turn, None, &mut out);
+    }
+    let told = all(&mut events);
+    assert_eq!(words(&told), ["0 pair-begin", "19 pair-end"]);
+    // Ten ticks on the fast side, three on the slow one.
+    assert!((life(&told[1]).impulse_W.y - 0.013).abs() < 1e-15, "{:?}", life(&told[1]));
+}
+
+/// What the slow side finds it tells a turn later.
+#[test]
+fn a_pair_that_goes_to_the_fast_list_at_once_begins_before_it_ends() {
+    let (link, slow) = pair_link();
+    let (mut out, mut events) = event_queue(64);
+    let mut watch = Watch::new(0, 0, 4, PERIOD_S).with_slow(Some(link));
+    slow.begin_turn();
+    slow_ticks(&slow, 10, 7..8);
+    slow.go(|_| true);
+    for run_tick in 9..40 {
+        if run_tick % 10 == 9 {
+            slow.begin_turn();
+        }
+        watch.begin(run_tick);
+        watch.take_from_slow(&mut out);
+        // A large island takes a while.
+        let standing = |_| if run_tick < 20 { PairStanding::Away } else { PairStanding::Stepped };
+        watch.pairs(std::iter::empty(), PERIOD_S, standing, &mut out);
+    }
+    let told = all(&mut events);
+    assert_eq!(words(&told), ["9 pair-begin", "24 pair-end"]);
+    assert!((life(&told[1]).impulse_W.y - 0.01).abs() < 1e-15, "{:?}", life(&told[1]));
 }
 
 #[test]
