@@ -1,6 +1,7 @@
 //! What `run --events` tells, against what the same run's rows say.
 
 use nalgebra::Vector3;
+use std::collections::HashSet;
 use system_tests::recording::{Sample, Table};
 use system_tests::workplace::Workplace;
 
@@ -63,6 +64,40 @@ fn impulses(events: &Table, kind: &str) -> Vec<Vector3<f64>> {
     (0..x.len()).map(|event| Vector3::new(x[event], y[event], z[event])).collect()
 }
 
+/// Beginnings and ends alternate, and nothing is open when a world ends, nor at the end of the run. Says how many ended then.
+fn check_ends(events: &Table) -> Vec<usize> {
+    let columns = ["kind", "finger", "entity", "other", "tick"].map(|column| events.texts(column));
+    let (mut open, mut ends, mut ended_with) = (HashSet::new(), Vec::new(), 0);
+    let last = columns[4].last().copied().unwrap_or_default();
+    for event in 0..events.len() {
+        let [kind, finger, entity, other, tick] = columns.each_ref().map(|column| column[event]);
+        let what = match kind {
+            "grasp" | "release" => "grasp",
+            "tied" | "untied" => "tie",
+            kind => kind.split_once('-').map_or(kind, |(what, _)| what),
+        };
+        let key = (what, finger, entity, other);
+        match kind {
+            "contact-begin" | "slip-begin" | "pair-begin" | "grasp" | "tied" => {
+                assert!(open.insert(key), "{kind} twice in tick {tick}: {key:?}");
+            }
+            "contact-end" | "slip-end" | "pair-end" | "release" | "untied" => {
+                assert!(open.remove(&key), "{kind} without a beginning in tick {tick}: {key:?}");
+                assert!(kind != "contact-end" || !open.contains(&("slip", finger, entity, other)), "{key:?}");
+                ended_with += 1;
+            }
+            "reset" | "scene" => {
+                assert!(open.is_empty(), "{kind} in tick {tick}: {open:?}");
+                ends.push(std::mem::take(&mut ended_with));
+            }
+            _ => ended_with = 0,
+        }
+        assert!(kind != "events-lost", "in tick {tick}");
+    }
+    assert!(open.is_empty(), "at the end in tick {last}: {open:?}");
+    ends
+}
+
 #[test]
 fn three_taps_are_three_contacts_whose_impulses_are_the_integrals_of_the_recorded_force() {
     let (_place, rows, events) = ran(TABLE, TAPS, "1.2");
@@ -86,13 +121,16 @@ fn slip_begins_and_ends_in_the_ticks_in_which_the_rows_say_so() {
     let (_place, rows, events) = ran(&scene, DRAG, "1.7");
     let slips: Vec<bool> = rows.finger("f0").iter().map(|sample| sample.friction == "slip").collect();
     let touches: Vec<bool> = rows.finger("f0").iter().map(Sample::touches).collect();
+    // Who does not touch does not slip.
+    let slips: Vec<bool> = slips.into_iter().zip(touches).map(|(slips, touches)| slips && touches).collect();
     let changes = |to: bool| {
         let both = 1..slips.len();
-        both.filter(|&tick| touches[tick] && slips[tick] == to && slips[tick - 1] != to).collect::<Vec<_>>()
+        both.filter(|&tick| slips[tick] == to && slips[tick - 1] != to).collect::<Vec<_>>()
     };
     assert_eq!(numbers::<usize>(of_kind(&events, "slip-begin", "tick")), changes(true));
     assert_eq!(numbers::<usize>(of_kind(&events, "slip-end", "tick")), changes(false));
     assert!(changes(true).len() >= 2, "it does not slip both ways");
+    check_ends(&events);
 }
 
 #[test]
@@ -105,7 +143,7 @@ fn each_bounce_of_a_dropped_cube_changes_its_momentum_by_the_told_impulse() {
         let lasted_s: Vec<f64> = numbers(of_kind(&events, "pair-end", "lasted_s"));
         let impulses = impulses(&events, "pair-end");
         assert!(!begins.is_empty(), "it never lands");
-        assert!(begins.len() <= lasted_s.len() + 1 && begins.len() < 20, "it chatters: {begins:?}");
+        assert!(begins.len() == lasted_s.len() && begins.len() < 20, "it chatters: {begins:?}");
         assert!(response.is_empty() || impulses.len() >= 2, "it does not bounce: {begins:?}");
         let cube = rows.body("cube");
         for ((begin, lasted_s), impulse) in begins.into_iter().zip(lasted_s).zip(impulses) {
@@ -149,6 +187,77 @@ fn two_virtual_runs_tell_the_same_bytes() {
         std::fs::read(place.path("events.jsonl")).expect("events")
     });
     assert!(runs[0] == runs[1] && !runs[0].is_empty());
+}
+
+/// Balls that lie on a table, most of them in the slow list, and a finger that is dragged over it.
+#[test]
+fn before_a_reset_before_another_scene_and_at_the_end_of_a_run_all_that_began_has_ended() {
+    let table = TABLE.replace("hand = \"hand.csv\"\n", "");
+    let scene = |balls: usize| {
+        let mut scene = format!("gravity_m_s2 = [0, -9.81, 0]\nlists = {{ fast_bodies = 8 }}\n{table}");
+        scene += "friction = { model = \"coulomb\", mu = 0.3 }\n";
+        for ball in 0..balls {
+            let [x, z] = [ball % 20, ball / 20].map(|cell| cell as f64 * 0.025 - 0.2);
+            scene += &format!(
+                "[[entity]]\nname = \"ball{ball}\"\nshape = {{ kind = \"sphere\", radius_m = 0.01 }}\n\
+                 position_m = [{x}, 0.01, {z}]\nmass_kg = 0.03\n"
+            );
+        }
+        scene
+    };
+    let place = Workplace::new();
+    place.write("scene.toml", scene(300));
+    place.write("other.toml", scene(280));
+    place.write("hand.csv", "t,f0_x,f0_y,f0_z\n0,-0.3,0.02,0\n0.1,-0.3,-0.002,0\n1.6,0.3,-0.002,0\n");
+    place.write("orders.txt", "at 0.3 reset\nat 0.7 swap other.toml\nat 1.1 reset\n");
+    for clock in ["virtual", "real"] {
+        let run = ["run", "scene.toml", "--hand", "hand.csv", "--clock", clock, "--seconds", "1.5"];
+        let said = place.run([&run[..], &["--orders", "orders.txt", "--events", "events.csv"]].concat());
+        assert_eq!(said.status, Some(0), "{}{}", said.out, said.err);
+        let events = Table::read(&place.path("events.csv"));
+        let ends = check_ends(&events);
+        assert_eq!(ends.len(), 3);
+        // On the real clock the slow list may not have had its turn yet.
+        assert!(clock == "real" || ends.iter().all(|ends| *ends > 270), "{ends:?}");
+        assert!(
+            !of_kind(&events, "slip-end", "tick").is_empty()
+                && !of_kind(&events, "list-change", "tick").is_empty()
+        );
+    }
+}
+
+/// Each falls by 3 mm, lies there asleep, and is lifted off by the finger or not.
+#[test]
+fn who_sleeps_is_held_up_meanwhile() {
+    let scene = "gravity_m_s2 = [0, -9.81, 0]\n[[finger]]\nstart_m = [0.5, 0.5, 0]\n\
+        [[entity]]\nname = \"table\"\nshape = { kind = \"plane\", normal = [0, 1, 0], offset_m = 0 }\n\
+        [[entity]]\nname = \"low\"\nshape = { kind = \"box\", size_m = [0.05, 0.05, 0.05] }\n\
+        position_m = [0, 0.028, 0]\nmass_kg = 0.1\n\
+        [[entity]]\nname = \"high\"\nshape = { kind = \"box\", size_m = [0.05, 0.05, 0.05] }\n\
+        position_m = [0, 0.081, 0]\nmass_kg = 0.2\n";
+    for lists in ["", "lists = { fast_bodies = 0 }\n"] {
+        let (_place, rows, events) = ran(&format!("{lists}{scene}"), "t,f0_x,f0_y,f0_z\n0,0.5,0.5,0\n", "4");
+        let last = rows.body("high").len() - 1;
+        let names =
+            of_kind(&events, "pair-end", "entity").into_iter().zip(of_kind(&events, "pair-end", "other"));
+        let mut got_n_s = [0.0; 2];
+        for ((entity, other), impulse) in names.zip(impulses(&events, "pair-end")) {
+            for (body, got_n_s) in ["low", "high"].into_iter().zip(&mut got_n_s) {
+                let sign = f64::from(u8::from(entity == body)) - f64::from(u8::from(other == body));
+                *got_n_s += sign * impulse.y;
+            }
+        }
+        for ((body, mass_kg), got_n_s) in [("low", 0.1), ("high", 0.2)].into_iter().zip(got_n_s) {
+            assert_eq!(rows.body(body)[last].velocity, Vector3::zeros(), "{body} does not sleep");
+            let weight_n_s = mass_kg * 9.81 * 1e-3 * (last + 1) as f64;
+            // What is left of the speed when it falls asleep is taken from it; the slow list goes on in turns of ten ticks.
+            let most_n_s = 1e-3 * weight_n_s + if lists.is_empty() { 0.0 } else { mass_kg * 9.81 * 0.02 };
+            assert!(
+                (got_n_s - weight_n_s).abs() < most_n_s,
+                "{lists}{body}: {got_n_s}, not {weight_n_s} N s"
+            );
+        }
+    }
 }
 
 /// They meet the table in one tick, and leave it in one.

@@ -166,7 +166,7 @@ pub enum Change {
     Begins,
     /// It slides from this tick on.
     Slips,
-    /// It holds again.
+    /// It holds again, or is about to end.
     Sticks,
     /// It is over.
     Ends,

@@ -165,7 +165,12 @@ impl Watch {
 
     fn take(&mut self, next: FromSlow, out: &mut EventSender) {
         match next {
-            FromSlow::Goes(pair) => self.pairs.adopt(&pair.seen_in(self.now.run_tick), out.grows()),
+            FromSlow::Goes(pair) => {
+                // Its end will be missing.
+                if !self.pairs.adopt(&pair.seen_in(self.now.run_tick), out.grows()) {
+                    out.lose();
+                }
+            }
             FromSlow::Happened(kind) => self.tell(kind, out),
         }
     }

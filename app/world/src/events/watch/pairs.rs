@@ -77,13 +77,14 @@ impl Pair {
 }
 
 impl Pairs {
-    /// Takes up one that the other side has watched until now, if there is room or there may be more.
-    pub(in crate::events) fn adopt(&mut self, from: &Pair, grows: bool) {
+    /// Takes up one that the other side has watched until now, if there is room or there may be more: says whether.
+    pub(in crate::events) fn adopt(&mut self, from: &Pair, grows: bool) -> bool {
         match self.touching.binary_search_by_key(&from.entities, |pair| pair.entities) {
             Ok(at) => self.touching[at] = self.touching[at].after(from),
             Err(at) if grows || self.touching.len() < self.most => self.touching.insert(at, *from),
-            Err(_) => {}
+            Err(_) => return false,
         }
+        true
     }
 
     /// Gives those away that the other side will watch, as far as it takes them.
