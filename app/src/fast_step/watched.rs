@@ -115,7 +115,8 @@ impl EventTeller {
             let moved_W = is_body.then(|| step.objects.touch_force_W(finger, contact.entity)).flatten();
             self.touching.push(Touching {
                 entity: contact.entity as u32,
-                force_on_user_W: moved_W.unwrap_or(contact.force_on_user_W),
+                // While forces fade, it feels less of what is fixed.
+                force_on_user_W: moved_W.unwrap_or(contact.force_on_user_W * step.strength),
                 slips: ContactState::from(contact.friction) == ContactState::Slip,
                 is_body,
             });

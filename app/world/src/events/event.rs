@@ -225,7 +225,9 @@ impl Life {
 
     /// Another tick of this length (s) with this force (N), the time since the last one (s) being part of its life.
     pub(super) fn go_on(&mut self, force_W: &Vector3<f64>, dt_s: f64, since_s: f64) {
-        self.force_n = force_W.norm();
+        if *force_W != Vector3::zeros() {
+            self.force_n = force_W.norm();
+        }
         self.peak_n = self.peak_n.max(self.force_n);
         self.impulse_W += force_W * dt_s;
         self.lasted_s += since_s;
