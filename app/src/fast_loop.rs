@@ -60,8 +60,8 @@ pub struct FastLoop {
     /// Finds what happens, and where that is told, if anybody wants to know.
     teller: EventTeller,
     events: Option<EventSender>,
-    /// In which tick of the run the driver told its fault, if it did.
-    fault_tick: Option<u64>,
+    /// Tick of the run of the last order or fault that was told, which may be behind the last row.
+    told_tick: Option<u64>,
     /// Whether no other scene has taken over.
     is_first_scene: bool,
     rows: RowSender,
@@ -165,7 +165,7 @@ impl FastLoop {
             pace: None,
             control: None,
             events: None,
-            fault_tick: None,
+            told_tick: None,
             is_first_scene: true,
             rows,
             when_full,
@@ -259,14 +259,14 @@ impl FastLoop {
         let run_tick = self.row.run_tick.saturating_add(since);
         if let Some(events) = &mut self.events {
             events.send(Event { run_tick, kind: Kind::Fault { reason: self.frame.fault } });
-            self.fault_tick = Some(run_tick);
+            self.told_tick = Some(run_tick);
         }
     }
 
     /// The run is over: tells that all ends that touched in its last tick. Nothing is told any more after that.
     pub fn end_events(&mut self) {
         if let Some(mut events) = self.events.take() {
-            self.teller.end_run(self.fault_tick, &mut events);
+            self.teller.end_run(self.told_tick, &mut events);
         }
     }
 
@@ -348,6 +348,7 @@ impl FastLoop {
         if let Some(events) = &mut self.events {
             for number in turned.taken.into_iter().flatten() {
                 events.send(Event { run_tick, kind: Kind::Order { number } });
+                self.told_tick = Some(run_tick);
             }
             for event in turned.told.into_iter().flatten() {
                 events.send(event);

@@ -90,10 +90,10 @@ impl EventTeller {
         out.send(Event { run_tick, kind: why });
     }
 
-    /// The run is over: all that began ends in the last tick that was told, or in a later one in which it stopped.
-    pub fn end_run(&mut self, stopped: Option<u64>, out: &mut EventSender) {
+    /// The run is over: all that began ends in the last tick that was looked at, or in a later one of which something was told.
+    pub fn end_run(&mut self, told: Option<u64>, out: &mut EventSender) {
         if let Some(run_tick) = self.watch.last_tick() {
-            self.end_all(stopped.map_or(run_tick, |stopped| stopped.max(run_tick)), out);
+            self.end_all(told.map_or(run_tick, |told| told.max(run_tick)), out);
         }
     }
 

@@ -148,6 +148,10 @@ fn each_bounce_of_a_dropped_cube_changes_its_momentum_by_the_told_impulse() {
         let cube = rows.body("cube");
         for ((begin, lasted_s), impulse) in begins.into_iter().zip(lasted_s).zip(impulses) {
             let ticks = (lasted_s * 1e3).round();
+            if begin + ticks as usize == cube.len() {
+                // It lies there when the run ends, and no row tells of what came after.
+                continue;
+            }
             let change = cube[begin + ticks as usize].velocity.y - cube[begin].velocity.y;
             let expected_n_s = 0.1 * (change + 9.81 * 1e-3 * ticks);
             // Semi-implicit: what differs is rounding, of numbers near 0.1 in up to 1500 ticks.

@@ -156,7 +156,8 @@ impl Watch {
     /// Before [`Self::pairs`], where there is a slow list: takes up the pairs that come from there and what happened to those
     /// that are there, which is told in this tick.
     pub fn take_from_slow(&mut self, out: &mut EventSender) {
-        let most = if out.grows() { usize::MAX } else { MOST_TOLD };
+        // What happens here has the rest of the tick's events: it does not wait.
+        let most = if out.grows() { usize::MAX } else { self.now.left / 2 };
         for _ in 0..most {
             let Some(Ok(next)) = self.slow.as_mut().map(|slow| slow.from_slow.pop()) else { break };
             self.take(next, out);
