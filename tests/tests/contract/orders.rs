@@ -205,11 +205,12 @@ fn pairs_are_told_once_whichever_list_they_are_in_and_however_often_that_changes
         assert_eq!(whom(&one), whom(&two), "{kind}");
     }
     assert_eq!(told(&two, "pair-begin", "entity").iter().filter(|(_, name)| *name != "drop").count(), 9);
+    // The cubes rest until the run ends, and change lists meanwhile.
     let bounces = |events: &Table| -> Vec<f64> {
-        told(events, "pair-end", "impulse_y_n_s")
-            .iter()
-            .map(|(_, cell)| cell.parse().expect("a number"))
-            .collect()
+        let names = told(events, "pair-end", "entity");
+        let impulses = told(events, "pair-end", "impulse_y_n_s");
+        let of_drop = names.iter().zip(&impulses).filter(|((_, name), _)| *name == "drop");
+        of_drop.map(|(_, (_, cell))| cell.parse().expect("a number")).collect()
     };
     let [one, two] = [&one, &two].map(bounces);
     assert!(!one.is_empty() && one.len() == two.len(), "{one:?}");
