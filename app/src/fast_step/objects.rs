@@ -250,6 +250,12 @@ impl Objects {
         self.stepped_s
     }
 
+    /// How long ago the slow list has had its last turn, where it has them here (s).
+    pub(super) fn slow_behind_s(&self) -> f64 {
+        let here = self.lists.as_ref().filter(|lists| lists.slow.is_some());
+        here.map_or(0.0, |lists| f64::from(lists.ticks) * self.period_s)
+    }
+
     /// The force on the user of a finger's touches on a body, as they moved it in the last tick (N); `None`: there were none.
     pub fn touch_force_W(&self, finger: usize, entity: usize) -> Option<Vector3<f64>> {
         let own = self.touches.iter().filter(|touch| (touch.finger, touch.entity) == (finger, entity));

@@ -179,7 +179,7 @@ impl EventTeller {
             |entity: u32| Some(self.gone.contains(&(manipulation.body_of(entity as usize)? as u32)));
         if !self.gone.is_empty() {
             let goes = |entities: [u32; 2]| entities.into_iter().filter_map(has_gone).all(|gone| gone);
-            self.watch.go_to_slow(stepped_s, goes);
+            self.watch.go_to_slow((stepped_s, step.objects.slow_behind_s()), goes);
         }
         let pairs = manipulation
             .pair_forces()

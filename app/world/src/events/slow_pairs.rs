@@ -90,7 +90,7 @@ impl FastPairs {
     /// Ends the slow side, which may be stepped on for a while. No real-time thread may.
     pub(super) fn end(&mut self) -> LastPairs {
         let mut watch = self.slow.lock();
-        watch.settle(None::<fn([u32; 2]) -> bool>);
+        watch.settle(None);
         watch.is_over = true;
         LastPairs { told: std::mem::take(&mut watch.waiting), pairs: std::mem::take(&mut watch.pairs) }
     }
@@ -109,7 +109,7 @@ impl SlowPairs {
     /// Before a turn: sends what the last one found, but for what is no news to the fast side.
     pub fn begin_turn(&self) {
         if let Some(mut watch) = self.alive() {
-            watch.settle(None::<fn([u32; 2]) -> bool>);
+            watch.settle(None);
             watch.send_waiting();
         }
     }
@@ -136,12 +136,14 @@ impl SlowPairs {
         }
     }
 
-    /// Before entities go to the fast side: so do the lives of their pairs, behind what was found of them.
-    pub fn go(&self, goes: impl Fn([u32; 2]) -> bool) {
+    /// Before entities go to the fast side: so do the lives of their pairs, behind what was found of them. Those that sleep would
+    /// have slept for so much longer (s) in this turn.
+    pub fn go(&self, goes: impl Fn([u32; 2]) -> bool, sleeps: impl Fn([u32; 2]) -> bool, for_s: f64) {
         if let Some(mut watch) = self.alive() {
             watch.settle(Some(&goes));
             let SlowWatch { pairs, waiting, .. } = &mut *watch;
             pairs.give_away(goes, |pair| {
+                let pair = if sleeps(pair.entities) { pair.after_sleep(for_s) } else { pair };
                 waiting.push_back(FromSlow::Goes(pair));
                 true
             });
@@ -157,7 +159,7 @@ impl SlowWatch {
 
     /// Makes news of what was found of these pairs, or of all that was: of a pair whose life has come it is no news that it
     /// begins. Lives of pairs that have not ended meanwhile go on here.
-    fn settle(&mut self, of: Option<impl Fn([u32; 2]) -> bool>) {
+    fn settle(&mut self, of: Option<&dyn Fn([u32; 2]) -> bool>) {
         while let Ok(pair) = self.from_fast.pop() {
             let pair = pair.seen_in(self.now.run_tick);
             self.came.entry(pair.entities).and_modify(|was| *was = pair.after(was)).or_insert(pair);

@@ -177,11 +177,11 @@ impl Watch {
     }
 
     /// The pairs that have gone to the slow list after a step of this length (s). Nobody knows their forces in it any more: they
-    /// are taken to be those of the step before.
-    pub fn go_to_slow(&mut self, dt_s: f64, goes: impl Fn([u32; 2]) -> bool) {
+    /// are taken to be those of the step before. The slow list's next turn goes on from so much earlier (s).
+    pub fn go_to_slow(&mut self, (dt_s, ahead_s): (f64, f64), goes: impl Fn([u32; 2]) -> bool) {
         let Self { pairs, slow: Some(slow), now, .. } = self else { return };
-        let (run_tick, period_s) = (now.run_tick, now.period_s);
-        pairs.give_away(goes, |pair| slow.to_slow.push(pair.once_more(dt_s, run_tick, period_s)).is_ok());
+        let tick = (now.run_tick, now.period_s);
+        pairs.give_away(goes, |pair| slow.to_slow.push(pair.once_more(dt_s, ahead_s, tick)).is_ok());
     }
 
     /// After all fingers: who holds what.

@@ -24,6 +24,8 @@ pub struct SlowList {
     untold: Vec<usize>,
     is_untold: Box<[bool]>,
     stepped: u64,
+    /// Time that is left of this turn (s).
+    left_s: f64,
     /// Who wants to know which entities press each other here.
     watch: Option<SlowPairs>,
 }
@@ -45,6 +47,7 @@ impl SlowList {
             untold: Vec::with_capacity(bodies),
             is_untold: vec![false; bodies].into(),
             stepped: 0,
+            left_s: 0.0,
             watch: None,
         }
     }
@@ -75,6 +78,7 @@ impl SlowList {
         if let Some(watch) = &self.watch {
             watch.begin_turn();
         }
+        self.left_s = if self.is_paused { 0.0 } else { f64::from(ticks) * dt_s };
         self.give_away();
         let (mut whole, mut made) = (0, None);
         for tick in 0..ticks {
@@ -90,11 +94,13 @@ impl SlowList {
             let step = self.manipulation.step(&mut self.entities, &mut [], dt_s);
             self.stepped += 1;
             self.look(step.parked, dt_s);
+            self.left_s -= dt_s;
             // A tick of many bodies takes long, and a finger waits.
             self.give_away();
             whole += u32::from(step.held == 0);
             made = Some(step);
         }
+        self.left_s = 0.0;
         self.tell();
         whole
     }
@@ -208,7 +214,9 @@ impl SlowList {
         let Self { watch: Some(watch), manipulation, island, .. } = self else { return };
         let is_in = |entity: u32| manipulation.body_of(entity as usize).map(|body| island.contains(&body));
         // What is fixed goes along with everybody.
-        watch.go(|entities| entities.into_iter().filter_map(is_in).all(|is_in| is_in));
+        let goes = |entities: [u32; 2]| entities.into_iter().filter_map(is_in).all(|is_in| is_in);
+        let sleeps = |entities| pair_standing(manipulation, entities) == PairStanding::Asleep;
+        watch.go(goes, sleeps, self.left_s);
     }
 
     /// Whether a body that is claimed is still on its way to here. One that is not, and not here either, has gone with

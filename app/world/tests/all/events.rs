@@ -240,7 +240,7 @@ fn a_pair_that_ends_in_the_turn_in_which_it_went_over_ends_once() {
         watch.begin(run_tick);
         watch.take_from_slow(out);
         if run_tick == 9 {
-            watch.go_to_slow(PERIOD_S, |_| true);
+            watch.go_to_slow((PERIOD_S, 0.0), |_| true);
         }
         let pairs = force_n.map(|force_n| pair(7, force_n));
         watch.pairs(pairs.into_iter(), PERIOD_S, |_| PairStanding::Stepped, out);
@@ -270,7 +270,7 @@ fn a_pair_that_goes_to_the_fast_list_at_once_begins_before_it_ends() {
     let mut watch = Watch::new(0, 0, 4, PERIOD_S).with_slow(Some(link));
     slow.begin_turn();
     slow_ticks(&slow, 10, 7..8);
-    slow.go(|_| true);
+    slow.go(|_| true, |_| false, 0.0);
     for run_tick in 9..40 {
         if run_tick % 10 == 9 {
             slow.begin_turn();

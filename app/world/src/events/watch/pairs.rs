@@ -27,6 +27,10 @@ pub(in crate::events) struct Pair {
     quiet_s: f64,
     /// It came from the other side, and its bodies may still be on their way.
     is_coming: bool,
+    /// Nobody steps it, since it rests.
+    is_asleep: bool,
+    /// What this side will count of its sleep that the other one has counted (s).
+    ahead_s: f64,
 }
 
 impl Pair {
@@ -35,11 +39,20 @@ impl Pair {
         Self { pressed: run_tick, is_coming: true, ..self }
     }
 
-    /// After another tick of this length (s) with the same force, and no other than this side's last one.
-    pub(super) fn once_more(mut self, dt_s: f64, run_tick: u64, period_s: f64) -> Self {
+    /// After another tick of this length (s) with the same force, and no other than this side's last one. The other side will
+    /// count so much time before that (s) as well.
+    pub(super) fn once_more(mut self, dt_s: f64, ahead_s: f64, (run_tick, period_s): (u64, f64)) -> Self {
         if self.force_W != Vector3::zeros() {
             let since_s = run_tick.saturating_sub(self.pressed) as f64 * period_s;
-            self.press(&self.force_W.clone(), dt_s, since_s, run_tick);
+            self.life.go_on(&self.force_W, dt_s, since_s);
+        }
+        Self { ahead_s, ..self }
+    }
+
+    /// After it has slept for so much longer (s).
+    pub(in crate::events) fn after_sleep(mut self, for_s: f64) -> Self {
+        if for_s > 0.0 {
+            self.rest(for_s, for_s, self.pressed);
         }
         self
     }
@@ -51,19 +64,34 @@ impl Pair {
 
     fn press(&mut self, force_W: &Vector3<f64>, dt_s: f64, since_s: f64, run_tick: u64) {
         self.life.go_on(force_W, dt_s, since_s);
-        (self.force_W, self.pressed, self.quiet_s, self.is_coming) = (*force_W, run_tick, 0.0, false);
+        (self.force_W, self.pressed, self.quiet_s, self.ahead_s) = (*force_W, run_tick, 0.0, 0.0);
+        (self.is_coming, self.is_asleep) = (false, false);
+    }
+
+    /// Goes on with the force that it had, if it has not just been taken up.
+    fn rest(&mut self, dt_s: f64, since_s: f64, run_tick: u64) {
+        let counted_s = self.ahead_s.min(dt_s);
+        self.ahead_s -= counted_s;
+        if self.force_W != Vector3::zeros() && since_s > 0.0 {
+            self.life.go_on(&self.force_W, dt_s - counted_s, since_s - counted_s);
+            self.pressed = run_tick;
+        }
+        (self.quiet_s, self.is_asleep) = (0.0, true);
     }
 
     /// A tick in which nobody says that it presses; whether it goes on.
     fn go_on(&mut self, standing: PairStanding, dt_s: f64, since_s: f64, run_tick: u64) -> bool {
         match standing {
-            PairStanding::Asleep if self.force_W != Vector3::zeros() => {
-                self.press(&self.force_W.clone(), dt_s, since_s, run_tick);
+            PairStanding::Asleep => self.rest(dt_s, since_s, run_tick),
+            PairStanding::Waiting => self.quiet_s = 0.0,
+            PairStanding::Away if self.is_coming => {
+                if self.is_asleep {
+                    self.rest(dt_s, since_s, run_tick);
+                }
+                return true;
             }
-            PairStanding::Asleep | PairStanding::Waiting => self.quiet_s = 0.0,
-            PairStanding::Away if self.is_coming => return true,
             PairStanding::Stepped | PairStanding::Away => {
-                self.force_W = Vector3::zeros();
+                (self.force_W, self.is_asleep, self.ahead_s) = (Vector3::zeros(), false, 0.0);
                 self.quiet_s += dt_s;
             }
         }
@@ -159,6 +187,8 @@ impl Pairs {
                     pressed: now,
                     quiet_s: 0.0,
                     is_coming: false,
+                    is_asleep: false,
+                    ahead_s: 0.0,
                 };
                 begun.press(&force_W, dt_s, dt_s, now);
                 begun.tell(Change::Begins, teller);
