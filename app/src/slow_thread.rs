@@ -20,6 +20,8 @@ use world::lists::SlowList;
 const TURN_NS: u64 = 10_000_000;
 /// A turn makes up for no more ticks.
 const MOST_TICKS: u64 = 40;
+/// So many bodies are stepped in a tick however busy the machine is: they take a millisecond or two.
+const LEAST_BODIES: usize = 64;
 /// A tick that steps all bodies takes no more than a third of this (ns).
 const PACE_NS: u64 = 9_000_000;
 
@@ -101,7 +103,7 @@ impl SlowLists {
                 let now_ns = monotonic_ns();
                 let took_ns = now_ns - std::mem::replace(&mut seen_ns, now_ns);
                 made.iter().for_each(|made| pace.take(took_ns, made.awake, made.held > 0));
-                manipulation.step_at_most(pace.bodies(), std::iter::empty());
+                manipulation.step_at_most(pace.bodies().max(LEAST_BODIES), std::iter::empty());
                 now_ns - begin_ns < TURN_NS
             })
         });

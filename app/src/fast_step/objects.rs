@@ -33,8 +33,8 @@ const MOST_UNTIL_IT_COMES_N: f64 = 3.0;
 const MOST_LEANING_N: f64 = 10.0;
 /// From where on such a contact is given up \[N\]: some centimetres deep.
 const GIVEN_UP_N: f64 = 20.0;
-/// Ticks for which a finger leans on after it did.
-const LEANS_ON: u32 = 64;
+/// Ticks for which a finger leans on after bodies that wait have held more than that.
+const LEANS_ON: u32 = 256;
 const MOST_GIVEN_UP: usize = 64;
 /// Ticks that a single step of the objects makes up for at most.
 const MOST_TICKS: f64 = 4.0;
@@ -82,10 +82,8 @@ pub struct Objects {
     given_up: Vec<(usize, usize)>,
     /// Of each finger, for how many ticks it is still taken for one that presses bodies into others that wait.
     leaning: Vec<u32>,
-    /// Force with which each of those pushes things away (N).
+    /// Force with which each of those pushes things away (N); zero for others.
     pushes_n: Vec<f64>,
-    /// Part of that which bodies that wait hold (N).
-    held_n: Vec<f64>,
     /// Of each finger, whether it felt less in the last tick, since what it presses had not been handed over, or waited.
     pub(super) gives_way: Vec<bool>,
     /// The most bodies that a tick steps.
@@ -141,7 +139,6 @@ impl Objects {
             given_up: Vec::with_capacity(room.min(MOST_GIVEN_UP)),
             leaning: vec![0; fingers.len()],
             pushes_n: vec![0.0; fingers.len()],
-            held_n: vec![0.0; fingers.len()],
             gives_way: vec![false; fingers.len()],
             most_stepped: usize::MAX,
             made: Made::default(),
@@ -391,8 +388,7 @@ impl Objects {
             // Bodies that were squeezed come back for a while, with nobody behind them.
             let is_held = held_n.min(pushes_n) > MOST_LEANING_N;
             self.leaning[finger] = if is_held { LEANS_ON } else { left.saturating_sub(1) };
-            self.pushes_n[finger] = pushes_n;
-            self.held_n[finger] = if is_held || left == 0 { held_n.min(pushes_n) } else { pushes_n };
+            self.pushes_n[finger] = if self.leaning[finger] > 0 { pushes_n } else { 0.0 };
         }
         for finger in 0..self.leaning.len() {
             self.gives_way[finger] = self.give_way_to(finger);
@@ -402,7 +398,7 @@ impl Objects {
     /// Says whether anything did.
     fn give_way_to(&mut self, finger: usize) -> bool {
         let mut gave_way = false;
-        let [pushes_n, held_n] = [self.pushes_n[finger], self.held_n[finger]];
+        let pushes_n = self.pushes_n[finger];
         for at in 0..self.touches.len() {
             let touch = self.touches[at];
             if touch.finger != finger {
@@ -410,11 +406,9 @@ impl Objects {
             }
             let touch_n = touch.force_on_user_W.norm();
             let is_on_its_way = self.is_on_its_way(touch.entity);
-            let (pressed_n, felt_n, stopped_n) = if is_on_its_way {
-                (touch_n, touch_n.min(MOST_UNTIL_IT_COMES_N), touch_n)
-            } else {
-                (pushes_n, pushes_n - (held_n - MOST_LEANING_N).max(0.0), held_n)
-            };
+            let (pressed_n, most_n) =
+                if is_on_its_way { (touch_n, MOST_UNTIL_IT_COMES_N) } else { (pushes_n, MOST_LEANING_N) };
+            let felt_n = pressed_n.min(most_n);
             if felt_n >= pressed_n {
                 continue;
             }
@@ -429,7 +423,7 @@ impl Objects {
             }
             self.touches[at].force_on_user_W = force_on_user_W;
             // What comes later must not find a spring of any length.
-            if stopped_n > GIVEN_UP_N && self.given_up.len() < self.given_up.capacity() {
+            if pressed_n > GIVEN_UP_N && self.given_up.len() < self.given_up.capacity() {
                 self.given_up.push((touch.finger, touch.entity));
             }
         }
