@@ -129,7 +129,7 @@ pub struct Passage {
     /// What it left behind, and for how long it has been fading (s).
     left_W: Vector3<f64>,
     fading_s: f64,
-    /// How much of it was left in the last tick (N).
+    /// Part of it that was left in the last tick (N).
     begun_n: f64,
     /// Forces of the last tick (N) of contacts with what is open in doors.
     felt: [Option<(usize, Vector3<f64>)>; MOST_OPEN],

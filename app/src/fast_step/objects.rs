@@ -247,7 +247,7 @@ impl Objects {
         self.stepped_s
     }
 
-    /// How long ago the slow list has had its last turn, where it has them here (s).
+    /// Time since the slow list has had its last turn, where it has them here (s).
     pub(super) fn slow_behind_s(&self) -> f64 {
         let here = self.lists.as_ref().filter(|lists| lists.slow.is_some());
         here.map_or(0.0, |lists| f64::from(lists.ticks) * self.period_s)

@@ -476,7 +476,7 @@ struct RecorderThread {
     events: EventReceiver,
     /// Events before those, whose row has not come yet.
     taken_in: VecDeque<Event>,
-    /// Whether others wait for it.
+    /// True if others wait for it.
     waits: bool,
     shared: Arc<Shared>,
     content: Arc<ContentState>,

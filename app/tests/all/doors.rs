@@ -1,4 +1,5 @@
 //! Doors through the whole fast step: what a finger is commanded there.
+#![allow(non_snake_case)] // Names carry their frame: W is the world.
 
 use bytemuck::Zeroable;
 use nalgebra::Vector3;

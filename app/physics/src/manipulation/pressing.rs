@@ -25,7 +25,7 @@ impl Manipulation {
         self.pairs.iter_awake().map(|(_, pair)| (pair.entities, pair.force_W(&self.room.rows)))
     }
 
-    /// How these two are stepped at the time, of which the last tick may tell no force.
+    /// Standing of these two, of which the last tick may tell no force.
     pub fn pair_standing(&self, entities: [usize; 2]) -> PairStanding {
         let standings = entities.map(|entity| Some(self.standing(self.body_of(entity)?)));
         let is_any = |of: fn(Standing) -> bool| standings.into_iter().flatten().any(of);

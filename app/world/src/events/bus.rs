@@ -25,7 +25,7 @@ pub struct EventSender {
 #[derive(Debug)]
 pub struct EventReceiver {
     queue: Receiving,
-    /// What came as a whole, as far as it has not been taken.
+    /// Events that came as a whole, as far as they have not been taken.
     unfolded: VecDeque<Event>,
     lost: Arc<AtomicU64>,
 }
@@ -48,7 +48,7 @@ pub(super) trait Unfold: Send + Debug {
     fn unfold(self: Box<Self>, run_tick: u64) -> Vec<Event>;
 }
 
-/// What is on its way.
+/// Something on its way.
 #[derive(Debug)]
 enum Item {
     One(Event),
@@ -118,7 +118,7 @@ impl EventSender {
         Ok(())
     }
 
-    /// Whether one more finds room, behind what is missing before it, which is told.
+    /// True if one more finds room, behind what is missing before it, which is told.
     fn has_room(&mut self, run_tick: u64) -> bool {
         let needed = if self.untold > 0 { 2 } else { 1 };
         if self.slots() < needed {
@@ -146,7 +146,7 @@ impl EventSender {
         }
     }
 
-    /// How many have been sent that nobody has taken yet.
+    /// Number that has been sent and that nobody has taken yet.
     pub fn waiting(&self) -> usize {
         match &self.queue {
             Sending::Places(queue) => queue.buffer().capacity() - queue.slots(),
@@ -209,7 +209,7 @@ impl EventReceiver {
         }
     }
 
-    /// How many wait to be taken.
+    /// Number that waits to be taken.
     pub fn waiting(&self) -> usize {
         let on_the_way = match &self.queue {
             Receiving::Places(queue) => queue.slots(),

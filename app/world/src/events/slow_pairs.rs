@@ -41,9 +41,9 @@ pub struct FastPairs {
 #[derive(Debug, Clone)]
 pub struct SlowPairs(Arc<Mutex<SlowWatch>>);
 
-/// What is left of the slow side when its world ends.
+/// Remains of the slow side when its world ends.
 pub(super) struct LastPairs {
-    /// What it had to tell.
+    /// Things that it had to tell.
     pub(super) told: VecDeque<FromSlow>,
     /// Those that still touch.
     pub(super) pairs: Pairs,

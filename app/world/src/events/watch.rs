@@ -75,13 +75,13 @@ impl From<physics::PairStanding> for PairStanding {
     }
 }
 
-/// What was so in the tick before; without any finger or pair at first, if it is none of a world.
+/// State of the tick before; without any finger or pair at first, if it is none of a world.
 #[derive(Debug, Default)]
 pub struct Watch {
     fingers: Vec<FingerWatch>,
     pairs: Pairs,
     grasps: Grasps,
-    /// Where pairs of the slow list are watched, if there is one.
+    /// Watch of the slow list's pairs, if there is one.
     slow: Option<FastPairs>,
     last_tick: Option<u64>,
     now: Now,
@@ -142,7 +142,7 @@ impl Watch {
         }
     }
 
-    /// Which entities press each other, in a step of this length (s). `standing`: why two others may not.
+    /// Pairs of entities that press each other, in a step of this length (s). `standing`: why two others may not.
     pub fn pairs(
         &mut self,
         pairs: impl Iterator<Item = PairForce>,

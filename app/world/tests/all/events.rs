@@ -262,7 +262,7 @@ fn a_pair_that_ends_in_the_turn_in_which_it_went_over_ends_once() {
     assert!((life(&told[1]).impulse_W.y - 0.013).abs() < 1e-15, "{:?}", life(&told[1]));
 }
 
-/// What the slow side finds it tells a turn later.
+/// Findings of the slow side are told a turn later.
 #[test]
 fn a_pair_that_goes_to_the_fast_list_at_once_begins_before_it_ends() {
     let (link, slow) = pair_link();

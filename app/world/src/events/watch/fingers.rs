@@ -37,7 +37,7 @@ impl FingerWatch {
         self.buttons
     }
 
-    /// How much of it has begun and not ended.
+    /// Number of what has begun and not ended.
     pub(super) fn open(&self) -> usize {
         let slips = self.touched.iter().filter(|touched| touched.slips).count();
         self.touched.len() + slips + usize::from(self.tied.is_some())

@@ -59,7 +59,7 @@ impl Grasps {
         });
     }
 
-    /// How many there are.
+    /// Number of them.
     pub(super) fn open(&self) -> usize {
         self.held.len()
     }

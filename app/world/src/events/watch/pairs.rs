@@ -29,7 +29,7 @@ pub(in crate::events) struct Pair {
     is_coming: bool,
     /// Nobody steps it, since it rests.
     is_asleep: bool,
-    /// What this side will count of its sleep that the other one has counted (s).
+    /// Part of its sleep that this side will count and the other one has counted (s).
     ahead_s: f64,
 }
 
@@ -57,7 +57,7 @@ impl Pair {
         self
     }
 
-    /// What it was before, too.
+    /// State before that, too.
     pub(in crate::events) fn after(self, before: &Self) -> Self {
         Self { life: before.life.followed_by(&self.life), ..self }
     }
@@ -153,7 +153,7 @@ impl Pairs {
         });
     }
 
-    /// How many there are.
+    /// Number of them.
     pub(super) fn open(&self) -> usize {
         self.touching.len()
     }
