@@ -185,7 +185,7 @@ impl EventTeller {
             .pair_forces()
             .map(|(entities, force_W)| PairForce { entities: entities.map(|entity| entity as u32), force_W });
         let standing =
-            |entities: [u32; 2]| manipulation.pair_standing(entities.map(|entity| entity as usize)).into();
+            |entities: [u32; 2]| manipulation.pair_standing(entities.map(|entity| entity as usize));
         self.watch.pairs(pairs, stepped_s, standing, out);
     }
 

@@ -32,5 +32,6 @@ mod watch;
 pub use bus::{EventReceiver, EventSender, Hub, Subscriber, event_queue, growing_event_queue};
 pub use event::{Change, Class, Event, Facts, Kind, Life, List, Why};
 pub use filter::Filter;
+pub use physics::PairStanding;
 pub use slow_pairs::{FastPairs, SlowPairs, pair_link};
-pub use watch::{MOST_TOLD, PairForce, PairStanding, QUIET_S, Touching, Watch};
+pub use watch::{MOST_TOLD, PairForce, QUIET_S, Touching, Watch};

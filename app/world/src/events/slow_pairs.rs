@@ -8,8 +8,9 @@
 //! slow end, in order.
 
 use super::bus::{EventReceiver, EventSender, growing_event_queue};
-use super::watch::{Now, Pair, PairForce, PairStanding, Pairs, Teller};
+use super::watch::{Now, Pair, PairForce, Pairs, Teller};
 use super::{Change, Event, Kind};
+use physics::PairStanding;
 use rtrb::{Consumer, Producer, RingBuffer};
 use std::collections::hash_map::Entry;
 use std::collections::{HashMap, VecDeque};

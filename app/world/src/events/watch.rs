@@ -23,6 +23,7 @@ use fingers::FingerWatch;
 use grasps::Grasps;
 use nalgebra::Vector3;
 pub(super) use pairs::{Pair, Pairs};
+use physics::PairStanding;
 
 /// The most events that a tick sends, unless the queue grows.
 pub const MOST_TOLD: usize = 256;
@@ -49,30 +50,6 @@ pub struct PairForce {
     pub entities: [u32; 2],
     /// The force on the first (N).
     pub force_W: Vector3<f64>,
-}
-
-/// Stepping of two entities, as far as what they do to each other can change by it.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum PairStanding {
-    /// One of them is stepped, or neither can move.
-    Stepped,
-    /// Nobody steps them, since they rest.
-    Asleep,
-    /// One of them waits for its turn: time stands still for it.
-    Waiting,
-    /// Another list has one of them, or it is on its way.
-    Away,
-}
-
-impl From<physics::PairStanding> for PairStanding {
-    fn from(standing: physics::PairStanding) -> Self {
-        match standing {
-            physics::PairStanding::Stepped => Self::Stepped,
-            physics::PairStanding::Asleep => Self::Asleep,
-            physics::PairStanding::Waiting => Self::Waiting,
-            physics::PairStanding::Away => Self::Away,
-        }
-    }
 }
 
 /// State of the tick before; without any finger or pair at first, if it is none of a world.

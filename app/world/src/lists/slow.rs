@@ -1,10 +1,10 @@
 //! The slow side of the two lists: steps what is in it, gives away what is claimed, says where it stands.
 
 use haptics::Entity;
-use physics::{Made, Manipulation, Standing};
+use physics::{Made, Manipulation, PairStanding, Standing};
 
 use super::link::{Came, Claim, Most, SlowEnd, Stand, send, take_in};
-use crate::events::{Kind, PairForce, PairStanding, SlowPairs};
+use crate::events::{Kind, PairForce, SlowPairs};
 
 /// The slow list.
 pub struct SlowList {
@@ -246,5 +246,5 @@ impl SlowList {
 }
 
 fn pair_standing(manipulation: &Manipulation, entities: [u32; 2]) -> PairStanding {
-    manipulation.pair_standing(entities.map(|entity| entity as usize)).into()
+    manipulation.pair_standing(entities.map(|entity| entity as usize))
 }

@@ -3,9 +3,10 @@
 //! Model: while two sleep in touch, what they did to each other in the last tick before goes on: that was the force of their
 //! rest, or none if they had just parted. Who waits for its turn has no time meanwhile, and nothing is added.
 
-use super::{Life, PairForce, PairStanding, QUIET_S, Teller};
+use super::{Life, PairForce, QUIET_S, Teller};
 use crate::events::{Change, Kind};
 use nalgebra::Vector3;
+use physics::PairStanding;
 
 /// Pairs that touch, in ascending order.
 #[derive(Debug, Default)]
