@@ -378,6 +378,19 @@ fn a_turn_that_has_no_time_answers_claims_and_says_what_it_left_undone() {
         made += 1;
     }
     assert_eq!(made, 400);
+    // What is asked for within a turn goes before that is over.
+    let Lists { fast, hand_over, slow } = &mut world.lists;
+    let mut ticks = 0;
+    slow.turn_while(10, DT, |manipulation, _| {
+        manipulation.step_at_most(bodies / 10, std::iter::empty());
+        if ticks == 5 {
+            hand_over.begin_tick(fast, &mut world.entities, std::iter::once(finger_at(12.0, 0.0)));
+        }
+        ticks += 1;
+        true
+    });
+    // The lower cube of the stack at 12 m.
+    assert_eq!((ticks, slow.manipulation().standing(3 * 60)), (10, Standing::Elsewhere));
     let waits = world.lists.hand_over.handed().waits;
     assert!(waits.count() > 0 && waits.most_ticks() <= 2, "{waits:?}");
 }
