@@ -104,7 +104,7 @@ impl Bench {
         let Lists { fast, hand_over, slow } = &mut self.lists;
         let before = hand_over.handed().parcels;
         let begin = Instant::now();
-        hand_over.begin_tick(fast, &mut self.entities, black_box(finger).into_iter());
+        hand_over.begin_tick(fast, &mut self.entities, black_box(finger).into_iter(), (self.tick, DT));
         let began_ns = begin.elapsed().as_nanos() as f64;
         fast.step(&mut self.entities, &mut [], DT);
         let begin = Instant::now();

@@ -32,6 +32,8 @@ pub struct Names {
     pub spaces: Option<Vec<String>>,
     /// Whether it is told in which list the bodies are: where there are two.
     pub lists: bool,
+    /// Whether it is told as of when bodies stand where they do.
+    pub as_of: bool,
 }
 
 impl Names {
@@ -131,6 +133,9 @@ pub fn columns(names: &Names) -> Vec<Column> {
         if names.lists {
             list.push(format!("{body}_list"), CellKind::Whole);
         }
+        if names.as_of {
+            list.push(format!("{body}_as_of"), CellKind::Number);
+        }
     }
     list.0
 }
@@ -197,6 +202,10 @@ pub fn each_cell(
     }
     for body in bodies {
         each_cell_of_body(body, names, &mut write);
+        if names.as_of {
+            let tick = body.as_of.unwrap_or(row.run_tick);
+            write(Cell::Number(run_time_s(tick.cast_signed(), period_ns)));
+        }
     }
 }
 

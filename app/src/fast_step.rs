@@ -297,7 +297,7 @@ impl FastStep {
             self.fingers.iter().zip(&self.tips_D).filter_map(|(finger, last_D)| {
                 finger.reach(devices.get(finger.device)?, last_D.as_ref(), dt_s)
             });
-        self.objects.reach(&mut self.entities, reaches);
+        self.objects.reach(&mut self.entities, reaches, row.run_tick);
         let world = World { entities: &self.entities, doors: &self.doors, objects: &self.objects };
         let mut all_carried_W = [Vector3::zeros(); MAX_DEVICES];
         let moved = self.tips_D.iter_mut().zip(&mut self.carried_W).zip(&mut all_carried_W);
@@ -320,7 +320,7 @@ impl FastStep {
                 row.force_on_user += finger.feel(felt, &self.effects, &self.entities, hip, moment);
             }
         }
-        self.objects.note(&self.entities);
+        self.objects.note(&self.entities, row.run_tick);
         if frame.run_tick >= 0 {
             let (entities, felt) = (&mut self.entities, &self.finger_effects);
             self.objects.step(entities, &self.fingers, felt, &mut row.fingers, dt_s);

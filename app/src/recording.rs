@@ -319,6 +319,7 @@ mod tests {
             grasp_quality: false,
             spaces: None,
             lists: false,
+            as_of: false,
         }
     }
 

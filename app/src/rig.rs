@@ -250,6 +250,7 @@ impl Rig {
 
     /// What the recording's columns are called, for devices that tell so much.
     pub fn names(&self, devices: &[Extras]) -> Names {
+        let lists = self.moving().count() > self.scene.dynamics.lists.fast_bodies;
         let of = |device: usize| devices.get(device).copied().unwrap_or_default();
         Names {
             extras: self.scene.fingers.iter().map(|finger| of(finger.device)).collect(),
@@ -258,7 +259,8 @@ impl Rig {
             ties: self.scene.fingers.iter().map(|finger| finger.attach.is_some()).collect(),
             grasp_quality: self.scene.dynamics.grasp_quality,
             spaces: self.space_names(),
-            lists: self.moving().count() > self.scene.dynamics.lists.fast_bodies,
+            lists,
+            as_of: lists,
             fingers: self.scene.fingers.iter().map(|finger| finger.name.clone()).collect(),
             entities: self.scene.entities.iter().map(|entity| entity.name.clone()).collect(),
             bodies: self.moving().map(|(_, entity, _)| entity.name.clone()).collect(),

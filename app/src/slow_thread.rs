@@ -1,6 +1,6 @@
 //! The thread of the slow list: steps what no finger is near, at its own rate.
 //!
-//! Model: some hundred times a second it looks how many ticks the run has made, and goes on by as many, in steps of a tick.
+//! Model: some hundreds of times a second it looks how many ticks the run has made, and goes on by as many, in steps of a tick.
 //! If that takes longer than it should, what is in the slow list goes slower than the rest, and how much is counted: a turn ends
 //! in time, and a tick steps no more bodies than it has time for ([`Pace`]), all in turns. For who asks for a body waits for the
 //! end of a tick.
@@ -16,8 +16,10 @@ use std::sync::mpsc::{self, Receiver};
 use std::thread::JoinHandle;
 use world::lists::SlowList;
 
-/// Between two turns (ns).
-const TURN_NS: u64 = 10_000_000;
+/// From one turn to the next, where there is time (ns): a thing at 1 m/s goes 2 mm.
+pub const EVERY_NS: u64 = 2_000_000;
+/// A turn takes no longer, but for its last tick (ns).
+const MOST_NS: u64 = 10_000_000;
 /// A turn makes up for no more ticks.
 const MOST_TICKS: u64 = 40;
 /// So many bodies are stepped in a tick however busy the machine is: they take a millisecond or two.
@@ -99,12 +101,11 @@ impl SlowLists {
         let (pace, begin_ns) = (&mut self.pace, monotonic_ns());
         let whole = self.lists.iter_mut().map(|slow| {
             let mut seen_ns = monotonic_ns();
-            slow.turn_while(ticks, dt_s, |manipulation, made| {
+            slow.turn_while(ticks, dt_s, |made| {
                 let now_ns = monotonic_ns();
                 let took_ns = now_ns - std::mem::replace(&mut seen_ns, now_ns);
                 made.iter().for_each(|made| pace.take(took_ns, made.awake, made.held > 0));
-                manipulation.step_at_most(pace.bodies().max(LEAST_BODIES), std::iter::empty());
-                now_ns - begin_ns < TURN_NS
+                (now_ns - begin_ns < MOST_NS).then(|| pace.bodies().max(LEAST_BODIES))
             })
         });
         whole.min().unwrap_or(ticks)
@@ -130,7 +131,7 @@ fn go_on(
         let passed = now - std::mem::replace(&mut seen, now);
         let whole = lists.turn(passed.min(MOST_TICKS) as u32, dt_s);
         late_ticks += passed - u64::from(whole);
-        due_ns = (due_ns + TURN_NS).max(monotonic_ns());
+        due_ns = (due_ns + EVERY_NS).max(monotonic_ns());
         sleep_until_ns(due_ns);
     }
     lists.last_begun().map(|slow| SlowRemains { slow, late_ticks })

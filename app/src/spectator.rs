@@ -190,7 +190,7 @@ impl Spectator {
             late: told.counts[1],
             latency_ns: told.latency_ns,
             lists: [bodies.len() - slow, slow],
-            is_slow: if slow == 0 { Vec::new() } else { self.slow_entities(bodies) },
+            slow_ms: if slow == 0 { Vec::new() } else { self.slow_ms(row, bodies) },
             felt: fingers
                 .map(|(number, finger)| so_far.felt(number, finger.entity.map(|entity| entity as usize)))
                 .collect(),
@@ -201,14 +201,14 @@ impl Spectator {
         }
     }
 
-    fn slow_entities(&self, bodies: &[BodyRow]) -> Vec<bool> {
-        let mut is_slow = vec![false; self.moments.entities()];
+    fn slow_ms(&self, row: &Row, bodies: &[BodyRow]) -> Vec<Option<u64>> {
+        let mut slow_ms = vec![None; self.moments.entities()];
         for (body, &entity) in bodies.iter().zip(self.moments.bodies()) {
-            if let Some(place) = is_slow.get_mut(entity) {
-                *place = body.is_slow;
+            if let Some(place) = slow_ms.get_mut(entity).filter(|_| body.is_slow) {
+                *place = Some(self.moments.age_ms(row, body));
             }
         }
-        is_slow
+        slow_ms
     }
 
     /// Moments may be left out; other scenes, and what people are to read, may not.

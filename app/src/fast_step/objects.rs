@@ -22,10 +22,8 @@ use super::ordered::Moved;
 use crate::displaced::Placed;
 use crate::lists_end::ListsEnd;
 use crate::row::{BodyRow, FingerRow};
-use crate::slow_thread::SlowRemains;
+use crate::slow_thread::{EVERY_NS, SlowRemains};
 
-/// Ticks between two turns of the slow list, where no thread of its own has it.
-const SLOW_EVERY: u32 = 10;
 /// A finger touches no more bodies at once.
 const MOST_TOUCHED: usize = 16;
 /// The most that is felt of what has not been handed over \[N\], and of what leans on bodies that wait.
@@ -199,9 +197,10 @@ impl Objects {
     }
 
     /// Before fingers are stepped: who could be reached soon comes into the fast list. `reaches` are the fingers'.
-    pub fn reach(&mut self, entities: &mut [Entity], reaches: impl Iterator<Item = Reach>) {
+    /// The tick is the run's of this number.
+    pub fn reach(&mut self, entities: &mut [Entity], reaches: impl Iterator<Item = Reach>, run_tick: u64) {
         if let Some(lists) = &mut self.lists {
-            lists.hand_over.begin_tick(&mut self.manipulation, entities, reaches);
+            lists.hand_over.begin_tick(&mut self.manipulation, entities, reaches, (run_tick, self.period_s));
         }
     }
 
@@ -213,7 +212,9 @@ impl Objects {
         lists.ticks += u32::from(is_running && !self.is_paused);
         lists.passed += 1;
         self.slow_turn = Duration::ZERO;
-        if let Some(slow) = lists.slow.as_mut().filter(|_| lists.passed >= SLOW_EVERY) {
+        // Where no thread of its own has it, it comes round as often.
+        let is_due = f64::from(lists.passed) * self.period_s * 1e9 > EVERY_NS as f64 - 1.0;
+        if let Some(slow) = lists.slow.as_mut().filter(|_| is_due) {
             let begin = Instant::now();
             slow.turn(lists.ticks, self.period_s);
             (lists.ticks, lists.passed) = (0, 0);
@@ -270,7 +271,7 @@ impl Objects {
     }
 
     /// Takes note of how the bodies are, and of where others stand that are moved.
-    pub fn note(&mut self, entities: &[Entity]) {
+    pub fn note(&mut self, entities: &[Entity], run_tick: u64) {
         self.placed.clear();
         let manipulation = &self.manipulation;
         let others = manipulation.driven().filter(|entity| !manipulation.is_body(*entity));
@@ -278,17 +279,18 @@ impl Objects {
         self.changed.clear();
         self.changed.extend_from_slice(self.manipulation.changed());
         self.manipulation.forget_changes();
-        self.note_changed();
+        self.note_changed(run_tick);
     }
 
     fn note_all(&mut self) {
         self.manipulation.forget_changes();
-        self.note_changed();
+        self.note_changed(0);
     }
 
-    fn note_changed(&mut self) {
+    fn note_changed(&mut self, run_tick: u64) {
         for &number in &self.changed {
             let is_slow = self.is_slow(number as usize);
+            let as_of = self.as_of(number as usize, run_tick);
             let (row, body) = (&mut self.rows[number as usize], &self.manipulation.bodies()[number as usize]);
             let (pose, spin_W) = (body.pose(), body.angular_velocity_W());
             let from_centre_W = pose.translation.vector - body.centre_W;
@@ -298,9 +300,18 @@ impl Objects {
                 velocity: body.velocity_W + spin_W.cross(&from_centre_W),
                 angular_velocity: spin_W,
                 is_slow,
+                as_of,
                 ..*row
             };
         }
+    }
+
+    /// The tick of the run as of which a body that moves in the slow list stands where it does, if that was before this one.
+    fn as_of(&self, number: usize, run_tick: u64) -> Option<u64> {
+        let lists = self.lists.as_ref().filter(|_| self.is_slow(number))?;
+        let (tick, body) = (lists.hand_over.as_of(number), &self.manipulation.bodies()[number]);
+        let rests = body.velocity_W == Vector3::zeros() && body.angular_momentum_W == Vector3::zeros();
+        (!rests && tick < run_tick).then_some(tick)
     }
 
     /// Nothing moves before a run begins: what fingers feel of bodies is what was rendered.

@@ -244,6 +244,7 @@ pub(super) fn columns_of(names: &Names) -> BTreeMap<String, String> {
         ("grasp_quality", json!(names.grasp_quality)),
         ("spaces", json!(names.spaces)),
         ("lists", json!(names.lists)),
+        ("as_of", json!(names.as_of)),
         ("fields", json!(super::schema::field_names(names))),
     ]
     .map(|(name, value)| (name.to_owned(), value.to_string()))
@@ -268,8 +269,9 @@ pub(super) fn names_of(facts: &BTreeMap<String, String>) -> Option<Names> {
         grasp_quality: list("grasp_quality")?.as_bool()?,
         // Not in recordings of before there were doors.
         spaces: words("spaces"),
-        // Recordings of before there were orders do not have it.
+        // Recordings of earlier versions do not have these.
         lists: list("lists").and_then(|lists| lists.as_bool()).unwrap_or_default(),
+        as_of: list("as_of").and_then(|as_of| as_of.as_bool()).unwrap_or_default(),
     })
 }
 
@@ -329,6 +331,7 @@ mod tests {
             grasp_quality: true,
             spaces: Some(vec!["inside".into()]),
             lists: true,
+            as_of: true,
         };
         let facts = columns_of(&names);
         assert_eq!(names_of(&facts), Some(names));

@@ -122,6 +122,8 @@ pub(super) mod object {
     pub(in crate::record) const CLOSURE: u32 = 8;
     /// 0: the fast list, 1: the slow one.
     pub(in crate::record) const LIST: u32 = 9;
+    /// An earlier tick; what has none is as of this one.
+    pub(in crate::record) const AS_OF: u32 = 10;
 }
 
 /// Fields of `phantom3.Event`.
@@ -183,6 +185,7 @@ pub(super) fn descriptors(names: &Names) -> Vec<u8> {
             (object::RESIDUAL, "residual", Double),
             (object::CLOSURE, "closure", Bool),
             (object::LIST, "list", Uint64),
+            (object::AS_OF, "as_of", Uint64),
         ],
     );
     let event = MessageType::new(

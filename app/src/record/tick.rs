@@ -98,6 +98,9 @@ fn write_body(out: &mut Message, body: &BodyRow, names: &Names) {
     if names.lists {
         out.whole(object::LIST, u64::from(body.is_slow));
     }
+    if let Some(tick) = body.as_of.filter(|_| names.as_of) {
+        out.whole(object::AS_OF, tick);
+    }
 }
 
 /// Reads a row and its bodies, of which those that are not told are as `before`; `None` if the message is none, or not of this
@@ -184,6 +187,7 @@ fn read_body(message: &[u8]) -> Option<BodyRow> {
             object::RESIDUAL => body.grasp.residual = value.double()?,
             object::CLOSURE => body.grasp.has_force_closure = value.whole()? != 0,
             object::LIST => body.is_slow = value.whole()? != 0,
+            object::AS_OF => body.as_of = Some(value.whole()?),
             _ => {}
         }
         Some(())
@@ -231,6 +235,7 @@ mod tests {
             grasp_quality: true,
             spaces: Some(vec!["hall".into(), "inside".into()]),
             lists: true,
+            as_of: true,
         }
     }
 
@@ -275,6 +280,7 @@ mod tests {
             angular_velocity: number(9),
             grasp: GraspQuality { contacts: 3, rank: 6, residual: 1e-9, has_force_closure: true },
             is_slow: true,
+            as_of: Some(12_340),
         }];
         let mut message = Message::new();
         write(&mut message, &row, (&bodies, None), &names(), 1_000_000);

@@ -271,6 +271,38 @@ fn what_moves_when_it_is_handed_over_keeps_its_momentum_and_gets_what_the_user_f
     assert!(momentum.x > 0.0, "it was thrown back: {momentum}");
 }
 
+/// A thousand balls that fly by below a finger at 1 m/s, all of them slow; the slow list has a turn every ten ticks.
+#[test]
+fn what_flies_by_near_a_finger_does_not_leap_and_tells_as_of_when_it_is_there() {
+    let balls = "[[entity]]\nname = \"ball\"\nshape = { kind = \"sphere\", radius_m = 0.01 }\nposition_m = [0, 0, 0]\n\
+                 velocity_m_s = [1, 0, 0]\nmass_kg = 0.1\nstiffness_n_per_m = 500\n\
+                 grid = { count = [40, 1, 25], spacing_m = [0.04, 1, 0.04] }\n";
+    let mut run = Run::new(&format!("{ALL_SLOW}{FLOATING}{balls}"));
+    let hip = [0.8, 0.06, 0.5];
+    let (mut near, mut leaps, mut oldest) = (0, 0, [0, 0]);
+    let mut before: Vec<_> = run.step.bodies().to_vec();
+    for tick in 0..400 {
+        run.tick(hip, true);
+        for (body, before) in run.step.bodies().iter().zip(&before) {
+            let is_near = (body.position - Vector3::from(hip)).norm() < 0.09;
+            let step_m = (body.position - before.position).norm();
+            assert!(!is_near || step_m < 2e-3 + 1e-12, "tick {tick}: {step_m} m");
+            near += usize::from(is_near);
+            leaps += usize::from(step_m > 9e-3);
+            // After the first turns, and the words of them.
+            if tick > 100 {
+                let age = &mut oldest[usize::from(!is_near)];
+                *age = body.as_of.map_or(0, |as_of| tick - as_of).max(*age);
+            }
+        }
+        before = run.step.bodies().to_vec();
+    }
+    assert_eq!(run.here(), 0);
+    assert!(near > 400 * 8 && leaps > 1000, "{near} near, {leaps} leaps elsewhere");
+    // A turn's ten ticks, the tick that makes it, and the one that takes it in; 320 places a turn for 1000 elsewhere.
+    assert!(oldest[0] <= 12 && (20..=60).contains(&oldest[1]), "{oldest:?}");
+}
+
 #[test]
 fn whenever_a_run_ends_each_body_is_in_one_list() {
     let grid = "grid = { count = [10, 1, 6], spacing_m = [0.1, 1, 0.1] }";

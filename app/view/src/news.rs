@@ -56,8 +56,8 @@ pub struct Status {
     pub latency_ns: Option<[u64; 3]>,
     /// Entities that can move, in the fast and in the slow list.
     pub lists: [usize; 2],
-    /// Of each entity, whether it is in the slow list; empty: none is.
-    pub is_slow: Vec<bool>,
+    /// Of each entity that is in the slow list, how long ago it stood where it is shown (ms); empty: none is.
+    pub slow_ms: Vec<Option<u64>>,
     /// Of each finger, the entities that it touches.
     pub felt: Vec<Vec<usize>>,
     /// Pairs of entities that touch each other, in ascending order.

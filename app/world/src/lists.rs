@@ -20,6 +20,7 @@
 mod fast;
 mod link;
 mod order;
+mod places;
 mod slow;
 mod waits;
 

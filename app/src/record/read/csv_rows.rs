@@ -109,12 +109,7 @@ impl CsvRows {
             known: &mut self.known,
             spaces: &mut self.names.spaces,
         };
-        let t_s = cells.number()?;
-        let ticks = (t_s * 1e9 / self.period_ns as f64).round();
-        let mut row = Row { run_tick: ticks as u64, ..Row::empty() };
-        if ticks < 0.0 || run_time_s(row.run_tick.cast_signed(), self.period_ns) != t_s {
-            return Err(format!("t is {t_s:?}, which is no multiple of the tick of {} ns", self.period_ns));
-        }
+        let mut row = Row { run_tick: cells.tick("t", self.period_ns)?, ..Row::empty() };
         let shape = &Shape {
             extras: &self.names.extras,
             passive: &self.names.passive,
@@ -125,7 +120,14 @@ impl CsvRows {
             *finger = cells.finger(index, shape)?;
         }
         let tells = (self.names.grasp_quality, self.names.lists);
-        let bodies = (0..self.names.bodies.len()).map(|_| cells.body(tells)).collect::<Result<_, _>>()?;
+        let mut bodies = vec![BodyRow::default(); self.names.bodies.len()];
+        for body in &mut bodies {
+            *body = cells.body(tells)?;
+            if self.names.as_of {
+                let tick = cells.tick("the time as of which a thing is there", self.period_ns)?;
+                body.as_of = Some(tick).filter(|tick| *tick != row.run_tick);
+            }
+        }
         Ok((row, bodies))
     }
 }
@@ -252,6 +254,16 @@ impl Cells<'_> {
         Ok(row)
     }
 
+    /// The tick of a time (s).
+    fn tick(&mut self, what: &str, period_ns: u64) -> Result<u64, String> {
+        let t_s = self.number()?;
+        let ticks = (t_s * 1e9 / period_ns as f64).round();
+        if ticks < 0.0 || run_time_s((ticks as u64).cast_signed(), period_ns) != t_s {
+            return Err(format!("{what} is {t_s:?}, which is no multiple of the tick of {period_ns} ns"));
+        }
+        Ok(ticks as u64)
+    }
+
     fn body(&mut self, (tells_grasp, tells_list): (bool, bool)) -> Result<BodyRow, String> {
         let position = self.vector()?;
         let [w, x, y, z] = self.numbers()?;
@@ -267,7 +279,7 @@ impl Cells<'_> {
         }
         let is_slow = tells_list && self.whole()? != 0;
         let orientation = Quaternion::new(w, x, y, z);
-        Ok(BodyRow { position, orientation, velocity, angular_velocity, grasp, is_slow })
+        Ok(BodyRow { position, orientation, velocity, angular_velocity, grasp, is_slow, as_of: None })
     }
 }
 
@@ -355,6 +367,8 @@ fn names_in(header: &str) -> Names {
         first_body.and_then(|first| all.iter().position(|column| *column == first)).unwrap_or(all.len());
     let has = |name: &String, ending: &str| all[..end].contains(&&*format!("{name}_{ending}"));
     let each = |ending: &str| fingers.iter().map(|name| has(name, ending)).collect::<Vec<bool>>();
+    let of_bodies =
+        |ending: &str| bodies.first().is_some_and(|body| all[end..].contains(&&*format!("{body}_{ending}")));
     let extras =
         fingers.iter().map(|name| Extras { orientation: has(name, "qw"), buttons: has(name, "buttons") });
     Names {
@@ -364,7 +378,8 @@ fn names_in(header: &str) -> Names {
         ties: each("attached"),
         grasp_quality: all[end..].iter().any(|column| column.ends_with("_closure")),
         spaces: each("space").contains(&true).then(Vec::new),
-        lists: bodies.first().is_some_and(|body| all[end..].contains(&&*format!("{body}_list"))),
+        lists: of_bodies("list"),
+        as_of: of_bodies("as_of"),
         entities: Vec::new(),
         fingers,
         bodies,

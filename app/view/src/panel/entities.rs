@@ -2,6 +2,7 @@
 
 use crate::news::Status;
 use crate::stage::{Known, Stage};
+use std::borrow::Cow;
 use std::collections::HashMap;
 
 /// Those whose names have all words of a filter, whatever their case. Remembers what it found.
@@ -66,14 +67,18 @@ impl Contacts {
     }
 }
 
-/// Which list has an entity.
-pub fn list(known: &Known, entity: usize, status: &Status) -> &'static str {
-    match (known.mass, status.is_slow.get(entity)) {
-        (None, _) => "fixed",
-        (Some(_), Some(true)) => "slow",
-        (Some(_), _) => "fast",
+/// Which list has an entity, and how long ago it stood where it is shown, if that is longer than nobody sees.
+pub fn list(known: &Known, entity: usize, status: &Status) -> Cow<'static, str> {
+    match (known.mass, status.slow_ms.get(entity).copied().flatten()) {
+        (None, _) => "fixed".into(),
+        (Some(_), Some(ms)) if ms >= SEEN_MS => format!("slow, -{ms} ms").into(),
+        (Some(_), Some(_)) => "slow".into(),
+        (Some(_), None) => "fast".into(),
     }
 }
+
+/// What is younger is as good as new (ms): a frame of a display.
+const SEEN_MS: u64 = 16;
 
 #[cfg(test)]
 mod tests {
@@ -118,9 +123,11 @@ mod tests {
     #[test]
     fn what_has_no_mass_is_in_no_list() {
         let moves = Known { mass: Some(MassSpec::Mass(0.1)), ..known("cube") };
-        let status = Status { is_slow: vec![false, true, true], ..Status::default() };
-        let lists = [(&moves, 0), (&moves, 1), (&known("table"), 2)];
-        assert_eq!(lists.map(|(known, number)| list(known, number, &status)), ["fast", "slow", "fixed"]);
+        let slow_ms = vec![None, Some(15), Some(0), Some(16)];
+        let status = Status { slow_ms, ..Status::default() };
+        let lists = [(&moves, 0), (&moves, 1), (&known("table"), 2), (&moves, 3)];
+        let told = lists.map(|(known, number)| list(known, number, &status));
+        assert_eq!(told, ["fast", "slow", "fixed", "slow, -16 ms"]);
         assert_eq!(list(&moves, 5, &Status::default()), "fast");
     }
 }

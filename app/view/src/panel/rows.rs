@@ -7,7 +7,7 @@ use crate::stage::Stage;
 use eframe::egui::{self, Align2, Color32, FontId, Rect, ScrollArea, Sense, TextStyle, pos2, vec2};
 
 /// Of the width, where the list's name and what touches it begin.
-const COLUMNS: [f32; 2] = [0.42, 0.55];
+const COLUMNS: [f32; 2] = [0.38, 0.6];
 /// Fewer rows are not shown.
 const LEAST_HEIGHT: f32 = 110.0;
 
@@ -38,7 +38,7 @@ pub(super) fn show(
                 ui,
                 height,
                 stage,
-                (entity, list(&stage.known[entity], entity, status)),
+                (entity, &list(&stage.known[entity], entity, status)),
                 contacts,
                 *selected,
             ) {

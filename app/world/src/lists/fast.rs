@@ -8,6 +8,7 @@ use super::ListSettings;
 use super::SlowList;
 use super::link::{Came, Claim, FastEnd, Most, send, take_in};
 use super::order::SlowOrder;
+use super::places::{Glides, Hips, MOST_FINGERS, Stand, take};
 use super::waits::Waits;
 
 /// Where a finger is and could be soon.
@@ -59,6 +60,11 @@ pub struct FastList {
     held: Vec<u32>,
     /// Bodies that an order waits for.
     fetched: Vec<u32>,
+    /// Where fingers are.
+    hips: Hips,
+    glides: Glides,
+    /// Of each body, the run's tick as of which it stands where it was told to be last.
+    as_of: Box<[u64]>,
     handed: Handed,
 }
 
@@ -78,6 +84,9 @@ impl FastList {
             moved: Vec::with_capacity(MAX_DRIVEN),
             held: Vec::with_capacity(MAX_DRIVEN),
             fetched: Vec::with_capacity(MAX_DRIVEN),
+            hips: Hips::none(),
+            glides: Glides::new(bodies),
+            as_of: vec![0; bodies].into(),
             handed: Handed::default(),
         }
     }
@@ -139,17 +148,26 @@ impl FastList {
         }
     }
 
-    /// Before a tick: takes in what has come, and claims what the fingers, or what is awake here, could reach.
+    /// The tick of the run as of which a body that is in the slow list stands where it is here.
+    pub fn as_of(&self, body: usize) -> u64 {
+        self.as_of[body]
+    }
+
+    /// Before a tick, the run's of this number and length (s): takes in what has come, and claims what the fingers, or what is
+    /// awake here, could reach.
     pub fn begin_tick(
         &mut self,
         manipulation: &mut Manipulation,
         entities: &mut [Entity],
         fingers: impl Iterator<Item = Reach>,
+        (run_tick, dt_s): (u64, f64),
     ) {
         self.tick += 1;
         self.soon.clear();
         self.around.clear();
+        self.hips.clear(run_tick);
         for finger in fingers.take(MOST_FINGERS).filter(is_finite) {
+            self.hips.push(finger.hip_W);
             let now = Aabb::of_ball(&finger.hip_W, finger.radius_m);
             self.soon
                 .push(now.swept(&(finger.velocity_W * self.settings.ahead_s)).grown(self.settings.near_m));
@@ -159,7 +177,9 @@ impl FastList {
             self.soon.push(moved);
             self.around.push(moved);
         }
-        self.take_in(manipulation, entities);
+        // Where there is no room, the slow side knows where they were a few ticks ago.
+        let _ = self.end.hips.push(self.hips);
+        self.take_in(manipulation, entities, dt_s);
         if self.here.len() < self.claimed.len() {
             self.claim_what_is_near(manipulation, entities);
         }
@@ -202,19 +222,22 @@ impl FastList {
         }
     }
 
-    fn take_in(&mut self, manipulation: &mut Manipulation, entities: &mut [Entity]) {
-        for _ in 0..STANDS_A_TICK {
-            let Ok(stand) = self.end.stands.pop() else { break };
-            let is_there = !self.held.contains(&stand.body);
-            if is_there && self.stays[stand.body as usize] == stand.stay {
-                manipulation.stands_elsewhere(
-                    stand.body as usize,
-                    &stand.state,
-                    entities,
-                    self.settings.ahead_s,
-                );
+    fn take_in(&mut self, manipulation: &mut Manipulation, entities: &mut [Entity], dt_s: f64) {
+        let Self { end, held, stays, hips, glides, as_of, settings, .. } = self;
+        let is_there =
+            |stand: &Stand| !held.contains(&stand.body) && stays[stand.body as usize] == stand.stay;
+        for stand in take(&mut end.stands) {
+            let body = stand.body as usize;
+            let is_newest = stand.as_of >= as_of[body];
+            if is_newest && is_there(&stand) && manipulation.standing(body) == Standing::Elsewhere {
+                as_of[body] = stand.as_of;
+                if let Some(stand) = glides.take(stand, &manipulation.bodies()[body], hips) {
+                    manipulation.stands_elsewhere(body, &stand.state, entities, settings.ahead_s);
+                }
             }
         }
+        let goes_on = |stand: &Stand, standing: Standing| is_there(stand) && standing == Standing::Elsewhere;
+        glides.step(manipulation, entities, (dt_s, settings.ahead_s), goes_on);
         self.take_in_parcels(manipulation, entities);
     }
 
@@ -273,6 +296,7 @@ impl FastList {
         if goes {
             for &body in &island {
                 self.stays[body] += 1;
+                self.as_of[body] = self.hips.run_tick;
             }
             self.here.retain(|body| island.binary_search(&(*body as usize)).is_err());
             self.handed.went += island.len() as u64;
@@ -305,12 +329,9 @@ fn is_finite(finger: &Reach) -> bool {
     finger.hip_W.iter().chain(finger.velocity_W.iter()).all(|x| x.is_finite())
 }
 
-const MOST_FINGERS: usize = crate::MAX_DEVICES;
 /// So many bodies are looked at in a tick for being given away.
 const LOOKED_AT: usize = 4;
 /// So many parcels are sent in a tick.
 const PARCELS_A_TICK: usize = 64;
 /// So many are taken in: two cubes on a floor, or as much of a large island as is sent.
 const TAKEN_A_TICK: Most = Most { parcels: PARCELS_A_TICK, with_an_end: 6 };
-/// So many places of what is in the slow list.
-const STANDS_A_TICK: usize = 16;

@@ -1,18 +1,10 @@
 //! The queues between the two lists.
 
 use super::order::{MOST_ORDERS, SlowOrder};
+use super::places::{Hips, MOST_HIPS, Stand, Stands, stands};
 use haptics::Entity;
-use physics::{Body, Manipulation, Parcel};
+use physics::{Manipulation, Parcel};
 use rtrb::{Consumer, Producer, RingBuffer};
-
-/// Where a body stands that is in the slow list, and how it moves.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Stand {
-    pub(super) body: u32,
-    /// How often it had come to the slow list by then: an old one must not place a body that was away meanwhile.
-    pub(super) stay: u32,
-    pub(super) state: Body,
-}
 
 /// A body that the fast side wants.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -28,7 +20,8 @@ pub(super) struct FastEnd {
     pub(super) claims: Producer<Claim>,
     pub(super) orders: Producer<SlowOrder>,
     pub(super) back: Consumer<Parcel>,
-    pub(super) stands: Consumer<Stand>,
+    pub(super) stands: Stands<Consumer<Stand>>,
+    pub(super) hips: Producer<Hips>,
 }
 
 /// The slow side's end.
@@ -37,7 +30,8 @@ pub(super) struct SlowEnd {
     pub(super) claims: Consumer<Claim>,
     pub(super) orders: Consumer<SlowOrder>,
     pub(super) back: Consumer<Parcel>,
-    pub(super) stands: Producer<Stand>,
+    pub(super) stands: Stands<Producer<Stand>>,
+    pub(super) hips: Consumer<Hips>,
 }
 
 /// Both ends, for so many bodies.
@@ -45,16 +39,18 @@ pub(super) fn link(bodies: usize) -> (FastEnd, SlowEnd) {
     let parcels = (bodies * PARCELS_OF_BODY).clamp(LEAST_PARCELS, MOST_PARCELS);
     let [(out, slow_back), (slow_out, back)] = [parcels_queue(parcels), parcels_queue(parcels)];
     let (claims, slow_claims) = RingBuffer::new(bodies.clamp(1, MOST_CLAIMS));
-    let (slow_stands, stands) = RingBuffer::new(bodies.clamp(1, MOST_STANDS));
+    let (slow_stands, stands) = stands(bodies);
     let (orders, slow_orders) = RingBuffer::new(MOST_ORDERS);
+    let (hips, slow_hips) = RingBuffer::new(MOST_HIPS);
     (
-        FastEnd { out, claims, orders, back, stands },
+        FastEnd { out, claims, orders, back, stands, hips },
         SlowEnd {
             out: slow_out,
             claims: slow_claims,
             orders: slow_orders,
             back: slow_back,
             stands: slow_stands,
+            hips: slow_hips,
         },
     )
 }
@@ -134,4 +130,3 @@ const LEAST_PARCELS: usize = 64;
 /// Larger islands go in parts.
 const MOST_PARCELS: usize = 4096;
 const MOST_CLAIMS: usize = 1024;
-const MOST_STANDS: usize = 4096;

@@ -41,7 +41,7 @@ impl SlowList {
 
     /// Whether its world is no more: nobody is left to hand anything to.
     pub fn is_over(&self) -> bool {
-        self.end.stands.is_abandoned()
+        self.end.claims.is_abandoned()
     }
 
     /// One whose world does not run yet.

@@ -3,7 +3,8 @@
 use haptics::Entity;
 use physics::{Made, Manipulation, PairStanding, Standing};
 
-use super::link::{Came, Claim, Most, SlowEnd, Stand, send, take_in};
+use super::link::{Came, Claim, Most, SlowEnd, send, take_in};
+use super::places::{Hips, Stand, Untold};
 use crate::events::{Kind, PairForce, SlowPairs};
 
 /// The slow list.
@@ -20,9 +21,9 @@ pub struct SlowList {
     /// Of them the bodies that an order waits for.
     fetched: Vec<usize>,
     island: Vec<usize>,
-    /// Bodies whose place has not been told since it changed, each once.
-    untold: Vec<usize>,
-    is_untold: Box<[bool]>,
+    untold: Untold,
+    /// Where fingers were when this turn began.
+    hips: Hips,
     stepped: u64,
     /// Time that is left of this turn (s).
     left_s: f64,
@@ -36,6 +37,7 @@ impl SlowList {
         let is_here = |body: usize| manipulation.standing(body) != Standing::Elsewhere;
         Self {
             stays: (0..bodies).map(|body| u32::from(is_here(body))).collect(),
+            untold: Untold::new(manipulation.bodies()),
             manipulation,
             entities,
             end,
@@ -44,8 +46,7 @@ impl SlowList {
             claimed: Vec::with_capacity(bodies),
             fetched: Vec::with_capacity(bodies),
             island: Vec::with_capacity(bodies),
-            untold: Vec::with_capacity(bodies),
-            is_untold: vec![false; bodies].into(),
+            hips: Hips::none(),
             stepped: 0,
             left_s: 0.0,
             watch: None,
@@ -59,22 +60,26 @@ impl SlowList {
 
     /// A turn: takes in, gives away what is claimed, goes on by so many ticks of this length (s), and tells.
     pub fn turn(&mut self, ticks: u32, dt_s: f64) {
-        self.turn_while(ticks, dt_s, |_, _| true);
+        self.turn_while(ticks, dt_s, |_| Some(usize::MAX));
     }
 
-    /// The same, as long as whoever is asked before each tick, with what the last one took, lets it go on; he may change how many
-    /// bodies it steps. Says how many ticks were made of which nothing was left undone.
+    /// The same, as long as whoever is asked before each tick, with what the last one took, says how many bodies it may step:
+    /// of more those that are nearest to fingers, and all others in turns. Says how many ticks were made of which nothing was left
+    /// undone.
     pub fn turn_while(
         &mut self,
         ticks: u32,
         dt_s: f64,
-        mut goes_on: impl FnMut(&mut Manipulation, Option<&Made>) -> bool,
+        mut most_bodies: impl FnMut(Option<&Made>) -> Option<usize>,
     ) -> u32 {
         self.take_orders();
         if !self.has_begun {
             return ticks;
         }
         self.take_in();
+        while let Ok(hips) = self.end.hips.pop() {
+            self.hips = hips;
+        }
         if let Some(watch) = &self.watch {
             watch.begin_turn();
         }
@@ -87,9 +92,8 @@ impl SlowList {
                 self.rest(ticks - tick, dt_s);
                 break;
             }
-            if !goes_on(&mut self.manipulation, made.as_ref()) {
-                break;
-            }
+            let Some(most) = most_bodies(made.as_ref()) else { break };
+            self.manipulation.step_at_most(most, self.hips.places_W());
             self.manipulation.make_room(&self.entities);
             let step = self.manipulation.step(&mut self.entities, &mut [], dt_s);
             self.stepped += 1;
@@ -228,19 +232,13 @@ impl SlowList {
 
     /// Says where everything stands that has moved.
     fn tell(&mut self) {
-        for &body in self.manipulation.changed() {
-            if !std::mem::replace(&mut self.is_untold[body as usize], true) {
-                self.untold.push(body as usize);
-            }
-        }
-        self.manipulation.forget_changes();
-        let Self { untold, is_untold, manipulation, end, stays, .. } = self;
-        untold.retain(|&body| {
-            let stand = Stand { body: body as u32, stay: stays[body], state: manipulation.bodies()[body] };
+        let Self { untold, manipulation, end, stays, hips, .. } = self;
+        manipulation.changed().iter().for_each(|&body| untold.add(body as usize));
+        manipulation.forget_changes();
+        untold.tell(hips, &mut end.stands, |body| {
+            let state = manipulation.bodies()[body];
             let is_here = manipulation.standing(body) != Standing::Elsewhere;
-            let waits = is_here && end.stands.push(stand).is_err();
-            is_untold[body] = waits;
-            waits
+            is_here.then_some(Stand { body: body as u32, stay: stays[body], as_of: hips.run_tick, state })
         });
     }
 }

@@ -53,7 +53,7 @@ impl World {
     /// A tick with fingers that touch nothing, and every tenth tick a turn of the slow side, unless it stalls.
     fn step(&mut self, fingers: &[Reach], slow_runs: bool) {
         let Lists { fast, hand_over, slow } = &mut self.lists;
-        hand_over.begin_tick(fast, &mut self.entities, fingers.iter().copied());
+        hand_over.begin_tick(fast, &mut self.entities, fingers.iter().copied(), (self.tick, DT));
         fast.step(&mut self.entities, &mut [], DT);
         hand_over.end_tick(fast, &self.entities);
         self.tick += 1;
@@ -244,7 +244,7 @@ fn what_falls_in_the_slow_list_is_seen_falling_and_caught_by_what_is_fast() {
     let mut was_apart = false;
     for tick in 1..1500 {
         let Lists { fast, hand_over, slow } = &mut lists;
-        hand_over.begin_tick(fast, &mut entities, [finger].into_iter());
+        hand_over.begin_tick(fast, &mut entities, [finger].into_iter(), (tick, DT));
         fast.step(&mut entities, &mut [], DT);
         hand_over.end_tick(fast, &entities);
         if tick % 10 == 0 {
@@ -299,7 +299,7 @@ fn an_island_that_takes_many_ticks_to_come_is_whole_or_stands_still_and_goes_on_
         let Lists { fast, hand_over, slow } = &mut lists;
         // Comes and goes.
         let fingers = (tick / 100 % 2 == 0).then_some(finger);
-        hand_over.begin_tick(fast, &mut entities, fingers.into_iter());
+        hand_over.begin_tick(fast, &mut entities, fingers.into_iter(), (tick, DT));
         fast.step(&mut entities, &mut [], DT);
         stepped += u32::from(!fast.awake().is_empty());
         hand_over.end_tick(fast, &entities);
@@ -363,14 +363,13 @@ fn a_turn_that_has_no_time_answers_claims_and_says_what_it_left_undone() {
     for tick in 0..400 {
         let Lists { fast, hand_over, slow } = &mut world.lists;
         let finger = (tick >= 200).then(|| finger_at(4.0, 0.0));
-        hand_over.begin_tick(fast, &mut world.entities, finger.into_iter());
+        hand_over.begin_tick(fast, &mut world.entities, finger.into_iter(), (tick, DT));
         fast.step(&mut world.entities, &mut [], DT);
         hand_over.end_tick(fast, &world.entities);
         let mut stepped = None;
-        let whole = slow.turn_while(10, DT, |manipulation, last| {
+        let whole = slow.turn_while(10, DT, |last| {
             stepped = last.copied();
-            manipulation.step_at_most(bodies / 10, std::iter::empty());
-            last.is_none()
+            last.is_none().then_some(bodies / 10)
         });
         let step = stepped.expect("a tick");
         assert!(step.awake + step.held <= bodies && step.awake <= bodies / 5, "{step:?}");
@@ -381,13 +380,12 @@ fn a_turn_that_has_no_time_answers_claims_and_says_what_it_left_undone() {
     // What is asked for within a turn goes before that is over.
     let Lists { fast, hand_over, slow } = &mut world.lists;
     let mut ticks = 0;
-    slow.turn_while(10, DT, |manipulation, _| {
-        manipulation.step_at_most(bodies / 10, std::iter::empty());
+    slow.turn_while(10, DT, |_| {
         if ticks == 5 {
-            hand_over.begin_tick(fast, &mut world.entities, std::iter::once(finger_at(12.0, 0.0)));
+            hand_over.begin_tick(fast, &mut world.entities, std::iter::once(finger_at(12.0, 0.0)), (400, DT));
         }
         ticks += 1;
-        true
+        Some(bodies / 10)
     });
     // The lower cube of the stack at 12 m.
     assert_eq!((ticks, slow.manipulation().standing(3 * 60)), (10, Standing::Elsewhere));
