@@ -496,7 +496,10 @@ impl FastLoop {
                 self.tally.rows += 1;
                 self.pending_bodies.clear();
             }
-            false => self.tally.rows_lost += 1,
+            false => {
+                self.rows.lose();
+                self.tally.rows_lost += 1;
+            }
         }
     }
 }

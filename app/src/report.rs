@@ -61,7 +61,7 @@ impl Report {
         let lacks_pictures = self.pictures.as_ref().is_some_and(|drawn| drawn.failure.is_some());
         let has_waited = self.timing.is_none();
         let is_whole = |recorded: &Recorded| {
-            recorded.failure.is_none() && !(has_waited && recorded.missing(self.tally.rows_lost) > 0)
+            recorded.failure.is_none() && !(has_waited && recorded.lost > 0)
         };
         lacks_pictures || !self.recordings.iter().all(is_whole)
     }
@@ -182,8 +182,7 @@ impl fmt::Display for Report {
         if self.recordings.is_empty() {
             return write!(f, "recording    none; --record FILE makes one");
         }
-        let lines: Vec<String> =
-            self.recordings.iter().map(|recorded| recording_line(recorded, tally.rows_lost)).collect();
+        let lines: Vec<String> = self.recordings.iter().map(recording_line).collect();
         write!(f, "{}", lines.join("\n"))?;
         for input in &self.left_out {
             write!(f, "\n             without {}", Plain(input))?;
@@ -200,11 +199,11 @@ fn has_reader(path: &Path) -> bool {
     path.metadata().is_ok_and(|found| !found.is_file())
 }
 
-/// What became of a recording, of a run that could not hand on so many rows.
-pub(crate) fn recording_line(recorded: &Recorded, rows_lost: u64) -> String {
-    let Recorded { path, rows, unit, is_left_behind, failure, is_as_before, .. } = recorded;
+/// What became of a recording.
+pub(crate) fn recording_line(recorded: &Recorded) -> String {
+    let Recorded { path, rows, unit, lost, is_left_behind, failure, is_as_before } = recorded;
     let who = if has_reader(path) { "its reader" } else { "the disk" };
-    let lost = match recorded.missing(rows_lost) {
+    let lost = match lost {
         0 => String::new(),
         lost if *is_left_behind => format!(" at least, {lost} LOST at most: {who} was too slow"),
         lost => format!(", {lost} LOST: {who} was too slow"),

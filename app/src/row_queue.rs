@@ -4,6 +4,7 @@
 //! bodies, a row's bodies being pushed before the row is. Whoever finds a row finds its bodies. A body that rests is sent
 //! once; the receiver keeps all of them as they were last. What is not a body and was moved all the same comes with its row,
 //! too.
+//! Rows that found no room are counted, and each row tells how many were missing before it.
 //! Each place has been written to once: where memory is not locked, the first touch would otherwise be a page fault of the
 //! fast thread, every few ticks for eight seconds.
 
@@ -11,6 +12,8 @@ use crate::displaced::Placed;
 use crate::row::{BodyRow, Row};
 use nalgebra::Isometry3;
 use rtrb::{Consumer, Producer, RingBuffer};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering};
 
 /// Rows that may wait: eight seconds at 1 kHz, so that a slow disk costs nothing.
 pub const ROW_QUEUE: usize = 8192;
@@ -28,10 +31,12 @@ pub struct RowSender {
     rows: Producer<Waiting>,
     bodies: Producer<(u32, BodyRow)>,
     placed: Producer<Placed>,
+    /// Rows that found no room.
+    lost: Arc<AtomicU64>,
 }
 
-/// A row, and how many bodies and how many others come with it.
-type Waiting = (Row, [u32; 2]);
+/// A row, how many bodies and how many others come with it, and how many rows had found no room by then.
+type Waiting = (Row, [u32; 2], u64);
 
 /// The slow side's end.
 pub struct RowReceiver {
@@ -41,6 +46,9 @@ pub struct RowReceiver {
     placed: Consumer<Placed>,
     /// All that ever came, each entity once.
     stand: Vec<Placed>,
+    lost: Arc<AtomicU64>,
+    /// Of these, those that have been told.
+    told: u64,
 }
 
 /// A queue for rows with so many bodies each.
@@ -51,7 +59,7 @@ pub fn row_queue(bodies: usize) -> (RowSender, RowReceiver) {
 
 /// A queue for so many rows with so many bodies each.
 pub fn row_queue_of(places: usize, bodies: usize) -> (RowSender, RowReceiver) {
-    let (rows, row_ends) = touched(places, (Row::empty(), [0; 2]));
+    let (rows, row_ends) = touched(places, (Row::empty(), [0; 2], 0));
     let (bodies_in, bodies_out) = touched(places * bodies, (0, BodyRow::default()));
     let (placed_in, placed_out) =
         touched((PLACED_A_ROW * places).max(PLACED_QUEUE), (0, Isometry3::identity()));
@@ -61,8 +69,11 @@ pub fn row_queue_of(places: usize, bodies: usize) -> (RowSender, RowReceiver) {
         of_row: vec![BodyRow::default(); bodies],
         placed: placed_out,
         stand: Vec::new(),
+        lost: Arc::default(),
+        told: 0,
     };
-    (RowSender { rows, bodies: bodies_in, placed: placed_in }, receiver)
+    let lost = Arc::clone(&receiver.lost);
+    (RowSender { rows, bodies: bodies_in, placed: placed_in, lost }, receiver)
 }
 
 fn touched<T: Clone>(places: usize, with: T) -> (Producer<T>, Consumer<T>) {
@@ -105,7 +116,13 @@ impl RowSender {
             // There is room.
             let _ = self.bodies.push(*body);
         }
-        self.rows.push((row, [bodies.len(), others].map(|count| count as u32))).is_ok()
+        let lost = self.lost.load(Ordering::Relaxed);
+        self.rows.push((row, [bodies.len(), others].map(|count| count as u32), lost)).is_ok()
+    }
+
+    /// A row that found no room is given up.
+    pub fn lose(&mut self) {
+        self.lost.fetch_add(1, Ordering::Relaxed);
     }
 }
 
@@ -120,9 +137,17 @@ impl RowReceiver {
         Some(self.rows.peek().ok()?.0.run_tick)
     }
 
+    /// Rows that were lost before the next one, or, if none waits, so far; each is told once.
+    pub fn take_lost(&mut self) -> u64 {
+        let lost = self.rows.peek().map_or_else(|_| self.lost.load(Ordering::Relaxed), |(.., lost)| *lost);
+        let untold = lost.saturating_sub(self.told);
+        self.told += untold;
+        untold
+    }
+
     /// The next row and all bodies, if one waits.
     pub fn receive(&mut self) -> Option<(Row, &[BodyRow])> {
-        let (row, [bodies, others]) = self.rows.pop().ok()?;
+        let (row, [bodies, others], _) = self.rows.pop().ok()?;
         for _ in 0..bodies {
             if let Ok((number, body)) = self.bodies.pop()
                 && let Some(place) = self.of_row.get_mut(number as usize)
@@ -209,5 +234,24 @@ mod tests {
         );
         assert!(receiver.receive().is_some());
         assert!(sender.send_with(Row::empty(), &[], &mut many) && many.is_empty());
+    }
+
+    #[test]
+    fn rows_that_are_lost_are_told_before_the_next_one_or_at_the_end() {
+        let (mut sender, mut receiver) = row_queue_of(2, 0);
+        let mut told = Vec::new();
+        for round in 0..3 {
+            for run_tick in 0..2 + round {
+                if !sender.send(Row { run_tick, ..Row::empty() }, &[]) {
+                    sender.lose();
+                }
+            }
+            for _ in 0..receiver.waiting() {
+                told.push(receiver.take_lost());
+                receiver.receive();
+            }
+        }
+        assert_eq!(told, [0, 0, 0, 0, 1, 0]);
+        assert_eq!([receiver.take_lost(), receiver.take_lost()], [2, 0]);
     }
 }

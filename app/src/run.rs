@@ -386,7 +386,7 @@ fn left_out(plan: &RunPlan, about: &About) -> Vec<String> {
 /// There is no report of a run that failed before its first tick, but what it was to record is named.
 fn tell_kept(recordings: &[Recorded]) {
     for recorded in recordings {
-        say(format_args!("{}", recording_line(recorded, 0)));
+        say(format_args!("{}", recording_line(recorded)));
     }
 }
 

@@ -189,6 +189,7 @@ impl SlowSide {
 
     fn take_rows(&mut self) {
         for _ in 0..self.rows.waiting() {
+            self.tell_lost();
             let Some((row, _)) = self.rows.receive() else { break };
             let (bodies, placed) = (self.rows.bodies(), self.rows.placed());
             // A tick's events are there before its row is.
@@ -210,12 +211,22 @@ impl SlowSide {
         }
     }
 
+    /// Tells the recordings of rows that the fast side had no room for, before the next row or at the end.
+    fn tell_lost(&mut self) {
+        let lost = self.rows.take_lost();
+        let requested = self.on_request.as_mut().and_then(OnRequest::recorder);
+        for recorder in self.recorders.iter_mut().chain(requested.filter(|recorder| recorder.has_begun())) {
+            recorder.miss(lost);
+        }
+    }
+
     /// Whether another scene has taken over, as its first row tells.
     fn go_on_to_next_scene(&mut self) -> bool {
         self.coming = self.coming.take().or_else(|| self.desk.as_mut()?.take_coming());
         let Some(coming) = self.coming.take_if(|coming| coming.rows.waiting() > 0) else { return false };
         // What came in before that row did.
         self.take_rows();
+        self.tell_lost();
         self.scenes += 1;
         let (stay, end): (Vec<_>, Vec<_>) =
             std::mem::take(&mut self.recorders).into_iter().partition(Recorder::is_of_events);
@@ -274,6 +285,7 @@ impl SlowSide {
     /// Takes the rest, and closes the recordings.
     pub fn finish(mut self) -> SlowEnd {
         self.step();
+        self.tell_lost();
         self.events.deliver(u64::MAX);
         let told = summary(&self.events);
         self.closed.append(&mut self.recorders);
@@ -322,4 +334,48 @@ fn summary(events: &Hub) -> String {
         let _ = write!(line, ", {} LOST: nobody took them in time", events.lost());
     }
     line
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::columns::Names;
+    use crate::fast_loop::WhenFull;
+    use crate::record::{Backpressure, Opened, RecordFile};
+    use crate::recording::Recording;
+    use crate::row_queue::{RowSender, row_queue_of};
+    use rt_core::signals::StopSignals;
+    use world::events::event_queue;
+
+    fn send(sender: &mut RowSender, ticks: std::ops::Range<u64>) {
+        for run_tick in ticks {
+            if !sender.send(Row { run_tick, ..Row::empty() }, &[]) {
+                sender.lose();
+            }
+        }
+    }
+
+    #[test]
+    fn rows_that_found_no_room_on_their_way_are_missing_in_the_recordings() {
+        let directory = tempfile::tempdir().expect("a directory");
+        let start = |name: &str| {
+            let path = directory.path().join(name);
+            let opened = Opened::recording(&path).expect("opened");
+            let table = Recording::begin(opened, Names::default(), 1_000_000).expect("a table");
+            let how = Backpressure::new(WhenFull::Drop, &StopSignals::default());
+            Recorder::start(&path, RecordFile::Csv(Box::new(table)), 0, 1_000_000, how).expect("a thread")
+        };
+        let (mut sender, rows) = row_queue_of(4, 0);
+        let hub = Hub::new(vec![event_queue(4).1]);
+        let mut slow = SlowSide::new(rows, hub, vec![start("a.csv"), start("b.csv")]);
+        send(&mut sender, 0..4);
+        slow.step();
+        // Seven find no room, and three of them no row behind them.
+        send(&mut sender, 4..12);
+        slow.step();
+        send(&mut sender, 12..19);
+        for recorded in slow.finish().recordings {
+            assert_eq!((recorded.rows, recorded.lost), (12, 7));
+        }
+    }
 }

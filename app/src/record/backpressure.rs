@@ -230,7 +230,7 @@ mod tests {
         assert!(lost > 0 && handed_over + lost == most, "{handed_over} {lost}");
         let recorded = recorder.finish();
         assert_eq!((recorded.unit, recorded.rows + recorded.lost), ("events", most));
-        let line = recording_line(&recorded, 12);
+        let line = recording_line(&recorded);
         let told = format!(
             "({} events at least, {} LOST at most: its reader was too slow)",
             recorded.rows, recorded.lost

@@ -1,7 +1,7 @@
 //! A recording on a thread of its own: whatever the disk does, nobody waits for it but the recording itself.
 //!
-//! Model: the slow side hands over rows through a bounded queue. In real time a row that finds no room is left out,
-//! counted, and told in the file where the format has a place for that; on a clock that can wait, it waits
+//! Model: the slow side hands over rows through a bounded queue. In real time a row that finds no room, here or on its way to
+//! the slow side, is left out, counted, and told in the file where the format has a place for that; on a clock that can wait, it waits
 //! ([`backpressure`](super::backpressure)). A disk that takes no more is told at once, and the rows that follow are thrown
 //! away: the run goes on. At the end the recorder has as long as it gets on; one that is stuck is given up. A reader of the
 //! standard output who has seen enough is no failure: the recording ends, and so may the run.
@@ -53,7 +53,7 @@ pub struct Recorded {
     pub rows: u64,
     /// Which of the two.
     pub unit: &'static str,
-    /// Of that unit, those that the recorder had no room for.
+    /// Of that unit, those that are missing.
     pub lost: u64,
     /// Its thread was left behind in the middle of a write: more of the rows may have reached it.
     pub is_left_behind: bool,
@@ -68,11 +68,6 @@ impl Recorded {
     pub fn not_begun(error: &RecordingError) -> Self {
         let (path, failure) = (error.file().into(), Some(error.to_string()));
         Self { path, rows: 0, unit: "rows", lost: 0, is_left_behind: false, failure, is_as_before: false }
-    }
-
-    /// Number of its unit that are missing, of a run that could not hand on so many rows.
-    pub fn missing(&self, rows_lost: u64) -> u64 {
-        if self.unit == EVENTS { self.lost } else { self.lost + rows_lost }
     }
 }
 
@@ -269,6 +264,19 @@ impl Recorder {
         for (known, body) in self.known.iter_mut().zip(bodies) {
             *known = Some(*body);
         }
+    }
+
+    /// So many rows are missing before the next one, which nobody had room for.
+    pub fn miss(&mut self, rows: u64) {
+        if !self.is_of_events() {
+            self.lost += rows;
+            self.untold += rows;
+        }
+    }
+
+    /// Whether it has got a row.
+    pub fn has_begun(&self) -> bool {
+        self.sent > 0
     }
 
     /// `false`: there is no room, and will be none as long as somebody waits.
