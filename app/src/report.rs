@@ -60,9 +60,7 @@ impl Report {
     pub fn lacks_a_recording(&self) -> bool {
         let lacks_pictures = self.pictures.as_ref().is_some_and(|drawn| drawn.failure.is_some());
         let has_waited = self.timing.is_none();
-        let is_whole = |recorded: &Recorded| {
-            recorded.failure.is_none() && !(has_waited && recorded.lost > 0)
-        };
+        let is_whole = |recorded: &Recorded| recorded.failure.is_none() && !(has_waited && recorded.lost > 0);
         lacks_pictures || !self.recordings.iter().all(is_whole)
     }
 }

@@ -18,7 +18,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 /// Rows that may wait: eight seconds at 1 kHz, so that a slow disk costs nothing.
 pub const ROW_QUEUE: usize = 8192;
 
-/// Bodies that may wait, of all rows together (100 MB); with more than 128 of them in a row, fewer rows can.
+/// Changed bodies that may wait, of all rows together (180 MB); where more than 128 change in each row, fewer rows can.
 const BODY_QUEUE: usize = 1 << 20;
 
 /// What is no body and was moved, for each row that may wait.
@@ -53,16 +53,24 @@ pub struct RowReceiver {
 
 /// A queue for rows with so many bodies each.
 pub fn row_queue(bodies: usize) -> (RowSender, RowReceiver) {
-    let places = BODY_QUEUE.checked_div(bodies).map_or(ROW_QUEUE, |places| places.clamp(2, ROW_QUEUE));
-    row_queue_of(places, bodies)
+    row_queue_of(ROW_QUEUE, BODY_QUEUE, bodies)
 }
 
-/// A queue for so many rows with so many bodies each.
-pub fn row_queue_of(places: usize, bodies: usize) -> (RowSender, RowReceiver) {
-    let (rows, row_ends) = touched(places, (Row::empty(), [0; 2], 0));
-    let (bodies_in, bodies_out) = touched(places * bodies, (0, BodyRow::default()));
-    let (placed_in, placed_out) =
-        touched((PLACED_A_ROW * places).max(PLACED_QUEUE), (0, Isometry3::identity()));
+/// A queue for so many rows with so many bodies each, and for no more of those, if they have changed, than `most` of all rows
+/// together; but for those of two rows.
+pub fn row_queue_of(places: usize, most: usize, bodies: usize) -> (RowSender, RowReceiver) {
+    let (mut sender, mut receiver) = untouched_row_queue_of(places, most, bodies);
+    touch(&mut sender.rows, &mut receiver.rows, (Row::empty(), [0; 2], 0));
+    touch(&mut sender.bodies, &mut receiver.bodies, (0, BodyRow::default()));
+    touch(&mut sender.placed, &mut receiver.placed, (0, Isometry3::identity()));
+    (sender, receiver)
+}
+
+/// The same for a thread that may meet page faults: what never waits takes no memory.
+pub fn untouched_row_queue_of(places: usize, most: usize, bodies: usize) -> (RowSender, RowReceiver) {
+    let (rows, row_ends) = RingBuffer::new(places);
+    let (bodies_in, bodies_out) = RingBuffer::new((places * bodies).min(most.max(2 * bodies)));
+    let (placed_in, placed_out) = RingBuffer::new((PLACED_A_ROW * places).max(PLACED_QUEUE));
     let receiver = RowReceiver {
         rows: row_ends,
         bodies: bodies_out,
@@ -76,11 +84,9 @@ pub fn row_queue_of(places: usize, bodies: usize) -> (RowSender, RowReceiver) {
     (RowSender { rows, bodies: bodies_in, placed: placed_in, lost }, receiver)
 }
 
-fn touched<T: Clone>(places: usize, with: T) -> (Producer<T>, Consumer<T>) {
-    let (mut producer, mut consumer) = RingBuffer::new(places);
+fn touch<T: Clone>(producer: &mut Producer<T>, consumer: &mut Consumer<T>, with: T) {
     while producer.push(with.clone()).is_ok() {}
     while consumer.pop().is_ok() {}
-    (producer, consumer)
 }
 
 impl RowSender {
@@ -212,7 +218,7 @@ mod tests {
 
     #[test]
     fn what_is_moved_beside_bodies_comes_with_its_row_and_stays_where_it_was_left() {
-        let (mut sender, mut receiver) = row_queue_of(64, 0);
+        let (mut sender, mut receiver) = row_queue_of(64, 0, 0);
         let at = |x: f64| Isometry3::translation(x, 0.0, 0.0);
         let mut waits: Vec<Placed> = vec![(3, at(0.1)), (1, at(0.2))];
         assert!(sender.send_with(Row::empty(), &[], &mut waits) && waits.is_empty());
@@ -237,8 +243,18 @@ mod tests {
     }
 
     #[test]
+    fn of_a_crowd_that_rests_as_many_rows_wait_as_of_a_single_thing() {
+        let (mut sender, _receiver) = untouched_row_queue_of(1000, 1 << 10, 10_000);
+        assert!(
+            sender.send(Row::empty(), &(0..10_000).map(|number| (number, body(0.0))).collect::<Vec<_>>())
+        );
+        let more = (1..2000).take_while(|_| sender.send(Row::empty(), &[(17, body(1.0))])).count();
+        assert_eq!(more, 999);
+    }
+
+    #[test]
     fn rows_that_are_lost_are_told_before_the_next_one_or_at_the_end() {
-        let (mut sender, mut receiver) = row_queue_of(2, 0);
+        let (mut sender, mut receiver) = row_queue_of(2, 0, 0);
         let mut told = Vec::new();
         for round in 0..3 {
             for run_tick in 0..2 + round {

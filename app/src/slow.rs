@@ -365,7 +365,7 @@ mod tests {
             let how = Backpressure::new(WhenFull::Drop, &StopSignals::default());
             Recorder::start(&path, RecordFile::Csv(Box::new(table)), 0, 1_000_000, how).expect("a thread")
         };
-        let (mut sender, rows) = row_queue_of(4, 0);
+        let (mut sender, rows) = row_queue_of(4, 0, 0);
         let hub = Hub::new(vec![event_queue(4).1]);
         let mut slow = SlowSide::new(rows, hub, vec![start("a.csv"), start("b.csv")]);
         send(&mut sender, 0..4);

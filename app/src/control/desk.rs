@@ -395,8 +395,7 @@ impl Desk {
     /// The world of another scene, and what others get of it.
     fn other_world(&mut self, rig: &Rig) -> Result<Box<Replacement>, String> {
         let bodies = rig.names(&self.means.extras).bodies.len();
-        let places = BODIES.checked_div(bodies).map_or(ROWS, |places| places.clamp(2, ROWS));
-        let (sender, rows) = row_queue_of(places, bodies);
+        let (sender, rows) = row_queue_of(ROWS, BODIES, bodies);
         let displaced = Displaced::new(rig.scene.entities.len());
         let other = Other { rows: sender, bodies: Vec::with_capacity(bodies), displaced, number: 0 };
         let mut world = self.world(rig, Some(other))?;

@@ -19,7 +19,7 @@ use crate::fast_loop::WhenFull;
 use crate::progress::{SOON, StatusLine};
 use crate::recording::RecordingError;
 use crate::row::{BodyRow, Row};
-use crate::row_queue::{ROW_QUEUE, RowReceiver, RowSender, row_queue_of};
+use crate::row_queue::{ROW_QUEUE, RowReceiver, RowSender, untouched_row_queue_of};
 use io_driver::device::run_time_s;
 use io_driver::say::say;
 use std::collections::VecDeque;
@@ -30,8 +30,8 @@ use std::thread::{JoinHandle, Thread};
 use std::time::{Duration, Instant};
 use world::events::{Event, EventReceiver, EventSender, Subscriber, growing_event_queue};
 
-/// Bodies that may wait, of all rows together.
-const MOST_BODIES: usize = 1 << 18;
+/// Changed bodies that may wait, of all rows together.
+const MOST_BODIES: usize = 1 << 20;
 /// Events that may wait; whoever has more for it waits, too.
 const MOST_EVENTS: usize = 8192;
 /// In real time nobody waits: so many, since a world that ends may bring the ends of all that touched at once.
@@ -166,8 +166,7 @@ impl Recorder {
         period_ns: u64,
         backpressure: Backpressure,
     ) -> Result<Self, RecordingError> {
-        let places = MOST_BODIES.checked_div(bodies).map_or(ROW_QUEUE, |places| places.clamp(64, ROW_QUEUE));
-        let (rows, receiver) = row_queue_of(places, bodies);
+        let (rows, receiver) = untouched_row_queue_of(ROW_QUEUE, MOST_BODIES, bodies);
         let shared = Arc::new(Shared::default());
         let content = file.content();
         let unit = if matches!(file, RecordFile::Events(_)) { EVENTS } else { "rows" };
