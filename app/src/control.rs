@@ -21,6 +21,7 @@ pub mod order;
 pub mod path;
 pub mod queue;
 pub mod words;
+mod world_maker;
 
 use crate::fast_step::FastStep;
 use carriage::Carriage;

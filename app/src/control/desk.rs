@@ -1,20 +1,21 @@
 //! The slow side of orders: reads them, checks them against the scene that will run then, makes what they need, sends them.
 //!
 //! Model: a script is sent as a whole before the run begins, each order with its tick: so it plays the same on every clock. Only
-//! the worlds that it brings are made one after the other: two are there before their time, and clocks that can wait wait for them.
+//! the worlds that it brings are made one after the other ([`WorldMaker`]): two are there before their time, and clocks that can
+//! wait wait for them.
 //! The standard input is read by a thread of its own; its orders are for the next tick.
 
 use super::gradual::MOST_TIMES;
-use super::order::{FrictionChange, Move, Order, Other, Replacement, Scale, Turn, Which};
+use super::order::{FrictionChange, Move, Order, Replacement, Scale, Turn, Which};
 use super::queue::{Dated, Lane, OrderReceiver, OrderSender, order_queue};
 use super::words::{self, Words};
+use super::world_maker::{self, Made, Wanted, WorldMaker};
 use crate::book::Book;
 use crate::bounded_lines::BoundedLines;
-use crate::displaced::Displaced;
 use crate::fast_step::FastStep;
 use crate::record::View;
 use crate::rig::{self, Rig};
-use crate::row_queue::{RowReceiver, row_queue_of};
+use crate::row_queue::RowReceiver;
 use crate::shown::Shown;
 use io_driver::device::Extras;
 use io_driver::say::say;
@@ -46,10 +47,6 @@ const MAX_ORDERS_BYTES: u64 = 16 << 20;
 const MOST_LINE_BYTES: usize = 64 << 10;
 /// Lines that may wait to be looked at; who writes more waits.
 const LINES: usize = 64;
-/// Rows of another scene that may wait.
-const ROWS: usize = 2048;
-/// Bodies that come with them.
-const BODIES: usize = 1 << 18;
 
 /// What orders need besides a rig.
 #[derive(Debug, Clone, Default)]
@@ -92,19 +89,14 @@ pub struct Desk {
     lines: Option<Receiver<String>>,
     coming: VecDeque<Coming>,
     /// Worlds that are made when there is room for them.
-    later: VecDeque<Later>,
+    later: VecDeque<Wanted>,
+    /// Who makes them, where time does not wait.
+    maker: Option<WorldMaker>,
     /// The rig as it is now, once for all worlds to come that have it.
     shared_rig: Option<Arc<Rig>>,
     /// Files of the scenes that they bring.
     inputs: Vec<PathBuf>,
     script: Script,
-}
-
-/// A world that is to be made.
-struct Later {
-    rig: Arc<Rig>,
-    /// It is that of another scene.
-    is_other: bool,
 }
 
 /// What is known of orders that were given for later.
@@ -127,7 +119,15 @@ impl Desk {
     pub fn open(rig: &Rig, source: &OrderSource, means: Means) -> Result<(Self, OrderReceiver), String> {
         let (mut desk, receiver) = Self::silent(rig, means)?;
         match source {
-            OrderSource::File(file) => desk.play(file)?,
+            OrderSource::File(file) => {
+                desk.play(file)?;
+                // The first are there when the run begins.
+                if !desk.later.is_empty() && desk.means.slow_lists.is_some() {
+                    let started = WorldMaker::start(desk.means.clone());
+                    desk.maker =
+                        Some(started.map_err(|error| rt_core::limits::no_thread(&error).to_string())?);
+                }
+            }
             OrderSource::Input => {
                 let no_thread = |error| {
                     let missing = rt_core::limits::no_thread(&error);
@@ -154,6 +154,7 @@ impl Desk {
             lines: None,
             coming: VecDeque::new(),
             later: VecDeque::new(),
+            maker: None,
             shared_rig: None,
             inputs: Vec::new(),
             script: Script::None,
@@ -258,7 +259,10 @@ impl Desk {
     fn make(&mut self, words: Words, lane: Lane) -> Result<Order, String> {
         Ok(match words {
             Words::Reset if lane == Lane::InTurn => self.replace_later(false),
-            Words::Reset => Order::Replace(self.world(&self.rig, None)?),
+            Words::Reset => {
+                let rig = self.shared_rig();
+                Order::Replace(self.world(&rig, false)?)
+            }
             Words::Scale(which, by, entity) => self.scale(which, by, entity.as_deref())?,
             Words::Friction(entity, spec) => self.friction(&entity, spec)?,
             Words::Move(entity, to_W, turn, over_s) => self.move_entity(&entity, to_W, turn, over_s)?,
@@ -272,40 +276,55 @@ impl Desk {
 
     /// Order for a world that has the scene as it is at this place of the script, and is made later.
     fn replace_later(&mut self, is_other: bool) -> Order {
-        let rig = Arc::clone(self.shared_rig.get_or_insert_with(|| Arc::new(self.rig.clone())));
-        self.later.push_back(Later { rig, is_other });
+        let rig = self.shared_rig();
+        self.later.push_back(Wanted { rig, is_other });
         Order::ReplaceByNext
     }
 
-    /// Makes worlds to come as long as there is room for them.
+    fn shared_rig(&mut self) -> Arc<Rig> {
+        Arc::clone(self.shared_rig.get_or_insert_with(|| Arc::new(self.rig.clone())))
+    }
+
+    /// Makes worlds to come as long as there is room for them, or takes those that were made.
     fn make_worlds(&mut self) {
-        while self.sender.has_room_for_world()
-            && let Some(Later { rig, is_other }) = self.later.pop_front()
-        {
-            let made = if is_other { self.other_world(&rig) } else { self.world(&rig, None) };
+        loop {
+            let made = match &mut self.maker {
+                Some(maker) => {
+                    while maker.under_way() < self.sender.rooms_for_worlds()
+                        && let Some(wanted) = self.later.pop_front()
+                    {
+                        maker.want(wanted);
+                    }
+                    maker.take()
+                }
+                None if self.sender.rooms_for_worlds() == 0 => None,
+                None => self.later.pop_front().map(|wanted| world_maker::make(&wanted, &self.means)),
+            };
             match made {
-                Ok(world) => self.sender.send_world(world),
-                Err(error) => {
+                None => return,
+                Some(Ok(made)) => {
+                    let world = self.take_made(made);
+                    self.sender.send_world(world);
+                }
+                Some(Err(error)) => {
                     say(format_args!(
                         "phantom3: a world of the script cannot be made, and none after it is: {error}"
                     ));
-                    self.later.clear();
+                    (self.later, self.maker) = (VecDeque::new(), None);
                 }
             }
         }
     }
 
-    /// A scene as it begins; its slow list, if it is somebody's to step, is his.
-    fn world(&self, rig: &Rig, other: Option<Other>) -> Result<Box<Replacement>, String> {
-        let step = rig.fast_step().map_err(|error| error.to_string())?;
-        let mut world = Replacement::new(step, other);
-        if let Some(slow_lists) = &self.means.slow_lists
-            && let Some(slow) = world.step.take_slow()
-        {
-            // Nobody to step it: the run is over.
-            let _ = slow_lists.send(slow.waiting());
-        }
-        Ok(world)
+    fn take_made(&mut self, (world, coming): Made) -> Box<Replacement> {
+        self.coming.extend(coming);
+        world
+    }
+
+    /// The world of a scene, made now.
+    fn world(&mut self, rig: &Arc<Rig>, is_other: bool) -> Result<Box<Replacement>, String> {
+        let made = world_maker::make(&Wanted { rig: Arc::clone(rig), is_other }, &self.means)?;
+        Ok(self.take_made(made))
     }
 
     fn friction(&mut self, entity: &str, spec: FrictionSpec) -> Result<Order, String> {
@@ -379,9 +398,10 @@ impl Desk {
             ));
         }
         if lane == Lane::Now {
-            let world = self.other_world(&rig)?;
+            let shared_rig = Arc::new(rig);
+            let world = self.world(&shared_rig, true)?;
             self.take_note(&world.step);
-            (self.rig, self.shared_rig) = (rig, None);
+            (self.rig, self.shared_rig) = (Rig::clone(&shared_rig), Some(shared_rig));
             return Ok(Order::Replace(world));
         }
         // What is wrong with it is told now, and what it needs is made later.
@@ -390,24 +410,6 @@ impl Desk {
         self.inputs.extend(rig.input_files());
         (self.rig, self.shared_rig) = (rig, None);
         Ok(self.replace_later(true))
-    }
-
-    /// The world of another scene, and what others get of it.
-    fn other_world(&mut self, rig: &Rig) -> Result<Box<Replacement>, String> {
-        let bodies = rig.names(&self.means.extras).bodies.len();
-        let (sender, rows) = row_queue_of(ROWS, BODIES, bodies);
-        let displaced = Displaced::new(rig.scene.entities.len());
-        let other = Other { rows: sender, bodies: Vec::with_capacity(bodies), displaced, number: 0 };
-        let mut world = self.world(rig, Some(other))?;
-        let names = rig.names(&self.means.extras);
-        let number = self.means.book.add_scene(&rig.scene_file.display().to_string(), names);
-        if let Some(other) = &mut world.other {
-            other.number = number;
-        }
-        let view = View::new(&rig.scene, world.step.entities(), self.means.is_recorded_as_seen);
-        let shown = self.means.is_shown.then(|| Shown::new(rig, world.step.entities()));
-        self.coming.push_back(Coming { rows, rig: rig.clone(), view, shown });
-        Ok(world)
     }
 
     /// What is known of the scene that will run.

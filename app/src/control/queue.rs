@@ -69,9 +69,9 @@ impl OrderSender {
         self.lane(lane).is_full()
     }
 
-    /// True if another world may be made before its time.
-    pub fn has_room_for_world(&self) -> bool {
-        !self.worlds.is_full()
+    /// How many more worlds may be made before their time.
+    pub fn rooms_for_worlds(&self) -> usize {
+        self.worlds.slots()
     }
 
     /// Sends the world for the next order that waits for one; it is dropped where there is no room.

@@ -490,6 +490,44 @@ fn too_much_on_what_is_to_be_moved_is_told_and_left_where_it_is() {
     assert_eq!(fast.step_mut().entities()[0].X_WB.translation.vector, Vector3::new(0.0, -0.01, 0.0));
 }
 
+/// Where time does not wait a thread of its own makes worlds, but for the first two.
+#[test]
+fn worlds_that_somebody_else_makes_come_in_the_order_of_the_script() {
+    let place = Place::new();
+    let rig = place.rig(PLATE, HandMode::Kinematic);
+    place.write("other.toml", PLATE);
+    let other = place.0.path().join("other.toml").display().to_string();
+    let script: String = (0..12)
+        .map(|at| {
+            format!(
+                "at {:.2} {}\n",
+                0.1 * f64::from(at + 1),
+                if at % 4 == 3 { format!("swap {other}") } else { "reset".into() }
+            )
+        })
+        .collect();
+    let source = OrderSource::File(place.write("orders.txt", &script));
+    let (slow_lists, _nobody) = channel();
+    let means = Means { slow_lists: Some(slow_lists), ..Means::default() };
+    let (mut desk, orders) = Desk::open(&rig, &source, means).expect("good orders");
+    let mut driver = VirtualDriver::open(&rig.driver_config(ClockMode::Virtual)).expect("devices");
+    let step = rig.fast_step().expect("a step");
+    let (rows, _rows) = row_queue(step.bodies().len());
+    let mut fast = FastLoop::new(step, rows, WhenFull::Drop, u64::MAX, rig.period_ns).with_control(orders);
+    let mut scenes = Vec::new();
+    for tick in 1..4000 {
+        // This clock could wait, as the thread's takes its time.
+        patience::until("a world", || {
+            desk.step();
+            !fast.wants_world()
+        });
+        driver.tick(tick, &mut fast);
+        scenes.extend(std::iter::from_fn(|| desk.take_coming()).map(|coming| coming.rig.scene_file));
+    }
+    assert_eq!(fast.orders(), OrderTally { taken: 12, undone: 0, never_reached: 0 });
+    assert!(scenes.len() == 3 && scenes.iter().all(|scene| scene.ends_with("other.toml")), "{scenes:?}");
+}
+
 /// The orders that were taken within a second of a run with this script, each with its tick, if these come before the run.
 fn taken_with(script: &str, now: &[&str]) -> Vec<(u64, String)> {
     let place = Place::new();
