@@ -1,6 +1,6 @@
 //! Answers about shapes, each worked out once for all entities that share a shape.
 //!
-//! Problem: the triangles of a solid joined of others take a tenth of a second, and a scene has shelves of one solid.
+//! Problem: the triangles of a solid joined of others take hundredths of a second, and a scene has shelves of one solid.
 //! Model: meshes, solids and patches are shared between the entities that use them alike, and are known again by that. Closed
 //! forms are cheap and not remembered.
 //! Cost: a comparison for each shared shape that was asked about before.

@@ -28,6 +28,7 @@ mod crowd;
 mod csg_cone;
 mod curved;
 mod detour;
+mod facets;
 mod feet;
 mod flatten;
 mod foresight;
@@ -47,6 +48,7 @@ mod walk;
 mod way_out;
 
 pub(crate) use csg_cone::CsgCone;
+pub use facets::Facets;
 pub(crate) use rolling::BallOnCsg;
 pub use tree::{CsgError, CsgOp, CsgPart, CsgTree, MAX_DEPTH, MAX_LEAVES, PartShape};
 

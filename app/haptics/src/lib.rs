@@ -85,7 +85,7 @@ pub use chart::{Chart, Coordinate, POLE_SHARE};
 pub use classic_god_object::ClassicGodObject;
 pub use cone::Cone;
 pub use contact::{Contact, RAMP_IN_S};
-pub use csg::{Csg, CsgError, CsgOp, CsgPart, CsgTree, MAX_DEPTH, MAX_LEAVES, PartShape};
+pub use csg::{Csg, CsgError, CsgOp, CsgPart, CsgTree, Facets, MAX_DEPTH, MAX_LEAVES, PartShape};
 pub use cuboid::Cuboid;
 pub use cylinder::Cylinder;
 pub use door::{Crossing, Door, FADE_S, Passage, SLAB_M, WORLD};

@@ -14,7 +14,7 @@ use physics::collide::bounding_ball;
 use serde_json::{Value, json};
 use std::collections::BTreeMap;
 use std::path::PathBuf;
-use view::shapes::{least_drawn_m, triangles};
+use view::shapes::triangles;
 use world::{EntityKind, MeshSpec, SceneEntity, ShapeSpec, model};
 
 /// What can be measured of an entity.
@@ -28,21 +28,13 @@ pub(super) struct Measures {
     pub(super) size_m: Option<[f64; 3]>,
     /// Whether it has none.
     is_endless: bool,
-    /// A solid joined of others of which nothing is drawn.
-    pub(super) undrawn: Option<Undrawn>,
+    /// Of a solid joined of others of which nothing is drawn, what is left.
+    pub(super) undrawn: Option<Remainder>,
     /// The middle of that, in the world (m).
     pub(super) middle_m: [f64; 3],
     /// `None`: it is fixed.
     pub(super) mass_kg: Option<f64>,
     pub(super) density_kg_m3: Option<f64>,
-}
-
-/// A solid without triangles.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Undrawn {
-    pub(super) remainder: Remainder,
-    /// Thickness below which it may not be drawn (m).
-    pub(super) least_drawn_m: f64,
 }
 
 impl Measures {
@@ -112,7 +104,7 @@ impl std::fmt::Display for Measures {
         match self.size_m {
             Some([x, y, z]) => write!(f, ", {} x {} x {} m", short(x), short(y), short(z))?,
             None if self.is_endless => write!(f, ", without an end")?,
-            None if self.undrawn.is_some_and(|it| it.remainder == Remainder::Nothing) => {
+            None if self.undrawn == Some(Remainder::Nothing) => {
                 write!(f, ", nothing is left of it")?;
             }
             None => write!(f, ", size not measured")?,
@@ -133,7 +125,7 @@ impl std::fmt::Display for Measures {
 struct Measured<'e> {
     /// The boxes around what runs, in its own frame (m); `None`: it has no end.
     felt: PerShape<'e, Option<[Vector3<f64>; 2]>>,
-    undrawn: PerShape<'e, Option<Undrawn>>,
+    undrawn: PerShape<'e, Option<Remainder>>,
     volumes_m3: PerShape<'e, Option<f64>>,
     seen: SeenMeshes,
 }
@@ -152,8 +144,8 @@ impl SeenMeshes {
 }
 
 /// `None`: it is not drawn because it has no end.
-fn undrawn(csg: &Csg) -> Option<Undrawn> {
-    has_an_end(csg).then(|| Undrawn { remainder: Remainder::of(csg), least_drawn_m: least_drawn_m(csg) })
+fn undrawn(csg: &Csg) -> Option<Remainder> {
+    has_an_end(csg).then(|| Remainder::of(csg))
 }
 
 /// It has nothing far away from where it is described.
@@ -255,7 +247,6 @@ mod tests {
             pairs.map(|(spec, entity)| Measures::of(spec, entity, None, &mut measured)).collect();
         let sizes: Vec<f64> = all.iter().filter_map(Measures::length_m).collect();
         assert_eq!(measured.felt.count(), 2);
-        // The grid of which a drawn solid is made finds faces to a billionth of its step.
         let expected = [0.1, 0.1, 0.1, 0.1, 0.05];
         assert!(
             sizes.len() == 5 && sizes.iter().zip(expected).all(|(a, b)| (a - b).abs() < 1e-9),

@@ -1,6 +1,6 @@
 //! Remainder of a solid joined of others: whether there is any.
 //!
-//! Problem: a drawing leaves out what is thinner than a cell of its grid, so that an empty one does not say that nothing is felt.
+//! Problem: a drawing leaves out what is thinner than rounding tells, so that an empty one does not say that nothing is felt.
 //! Model: no place within `r` of one is inside if the distance there is more than `r`, since the distance that a solid tells is
 //! never too large. Cubes are divided until that holds for all of them, or there are too many. A place inside is looked for from
 //! a lattice: to the boundary that is nearest, and a little further.

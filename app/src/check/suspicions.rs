@@ -63,19 +63,15 @@ fn length(rig: &Rig, it: &Measures) -> Option<String> {
 }
 
 fn not_drawn(it: &Measures) -> Option<String> {
-    let (name, undrawn) = (&it.name, it.undrawn?);
+    let (name, remainder) = (&it.name, it.undrawn?);
     let why = "of a difference the first child is what the others are taken away from, and all children of an intersection \
                have to meet";
-    let least_m = short(undrawn.least_drawn_m);
-    Some(match undrawn.remainder {
+    Some(match remainder {
         Remainder::Nothing => format!("of {name} nothing is left, and nobody feels it; {why}"),
-        Remainder::Something => format!(
-            "{name} is felt but not drawn, for it is too thin: in a solid of its size what is thinner than {least_m} m may be \
-             left out of pictures"
-        ),
-        Remainder::Unknown => format!(
-            "of {name} nothing is drawn, for nothing is left or all of it is thinner than {least_m} m; {why}"
-        ),
+        Remainder::Something => format!("{name} is felt but not drawn, for all of it is too thin"),
+        Remainder::Unknown => {
+            format!("of {name} nothing is drawn, for nothing is left or all of it is too thin; {why}")
+        }
     })
 }
 

@@ -2,8 +2,8 @@
 
 use crate::solids;
 use crate::triangles::{Ring, Triangles};
+use haptics::Shape;
 use haptics::mesh::CornerUv;
-use haptics::{Csg, Shape};
 use nalgebra::{Point3, UnitQuaternion, Vector3};
 use std::f64::consts::{PI, TAU};
 use world::ShapeSpec;
@@ -39,11 +39,6 @@ pub fn triangles(spec: &ShapeSpec, model: Option<&Shape>) -> Option<Triangles> {
         }
         _ => modelled(model?)?,
     })
-}
-
-/// Of a solid joined of others what is thinner may not be drawn (m).
-pub fn least_drawn_m(csg: &Csg) -> f64 {
-    solids::least_drawn_m(csg)
 }
 
 fn modelled(shape: &Shape) -> Option<Triangles> {

@@ -208,7 +208,7 @@ fn check_tells_of_solids_of_which_nothing_is_left() {
         .chain([solid("swapped", "difference", 0.2), solid("bitten", "difference", 0.05)])
         .chain([solid("apart", "intersection", 0.015), solid("slice", "intersection", 0.05)])
         .collect::<String>();
-    // A plate of 1 mm is felt, but is thinner than a cell of the grid that solids are drawn in; so is one of 0.01 mm.
+    // However thin, plates are felt and measured.
     let plate = |name: &str, x: f64| {
         let cube = "shape = { kind = \"box\", size_m = [0.1, 0.1, 0.1] }";
         format!(
@@ -218,16 +218,12 @@ fn check_tells_of_solids_of_which_nothing_is_left() {
     };
     place.write("scene.toml", scene + &plate("thin", 0.001) + &plate("foil", 0.00001) + &plate("gone", 0.0));
     let said = check(&place, &["scene.toml"]);
-    for name in ["thin", "foil"] {
-        assert!(
-            said.out.contains(&format!("{name} is felt but not drawn, for it is too thin")),
-            "{}",
-            said.out
-        );
-        assert!(said.out.contains(&format!("{name}: csg, size not measured")), "{}", said.out);
+    for (name, size) in [("thin", "0.001 x 0.1 x 0.1"), ("foil", "0.00001 x 0.1 x 0.1")] {
+        assert!(said.out.contains(&format!("{name}: csg, {size} m")), "{}", said.out);
+        assert!(!said.out.contains(&format!("{name} is felt but not drawn")), "{}", said.out);
     }
     assert!(
-        said.out.contains("of gone nothing is drawn, for nothing is left or all of it is thinner"),
+        said.out.contains("of gone nothing is drawn, for nothing is left or all of it is too thin"),
         "{}",
         said.out
     );

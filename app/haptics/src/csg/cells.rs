@@ -106,11 +106,27 @@ struct Building<'p> {
     items: Vec<Item>,
 }
 
-/// What of a part of the tree is left within some ball.
-enum Left {
+/// Remainder of a part of the tree in some part of space.
+pub(super) enum Left<S> {
     Nothing,
     Everything,
-    Some(Vec<CellStep>),
+    Some(Vec<S>),
+}
+
+/// A step of an evaluation.
+pub(super) trait OfTree: Copy {
+    /// A leaf that is everywhere.
+    const EVERYTHING: Self;
+    /// Joins the two on top.
+    fn join(op: CsgOp) -> Self;
+}
+
+impl OfTree for CellStep {
+    const EVERYTHING: Self = Self::Leaf { first: 0, count: 0 };
+
+    fn join(op: CsgOp) -> Self {
+        Self::Join(op)
+    }
 }
 
 impl<'p> Building<'p> {
@@ -178,7 +194,7 @@ impl<'p> Building<'p> {
         }
         let steps = match stack.pop().unwrap_or(Left::Nothing) {
             Left::Nothing => Vec::new(),
-            Left::Everything => vec![EVERYTHING],
+            Left::Everything => vec![CellStep::EVERYTHING],
             Left::Some(steps) => steps,
         };
         let first = self.steps.len() as u32;
@@ -191,7 +207,7 @@ impl<'p> Building<'p> {
         Cell { children: 0, first, count: steps.len() as u32, items }
     }
 
-    fn leaf(&mut self, first: u32, count: u32, centre_B: &Vector3<f64>, radius_m: f64) -> Left {
+    fn leaf(&mut self, first: u32, count: u32, centre_B: &Vector3<f64>, radius_m: f64) -> Left<CellStep> {
         let start = self.items.len();
         for index in first..first + count {
             let item = self.items[index as usize];
@@ -212,7 +228,8 @@ impl<'p> Building<'p> {
     }
 }
 
-fn join(op: CsgOp, a: Left, b: Left) -> Left {
+/// Remainder of two that are joined.
+pub(super) fn join<S: OfTree>(op: CsgOp, a: Left<S>, b: Left<S>) -> Left<S> {
     use Left::{Everything, Nothing, Some};
     match (op, a, b) {
         (CsgOp::Union, Nothing, left) | (CsgOp::Union, left, Nothing) => left,
@@ -221,18 +238,17 @@ fn join(op: CsgOp, a: Left, b: Left) -> Left {
         (CsgOp::Intersection, Everything, left) | (CsgOp::Intersection, left, Everything) => left,
         (CsgOp::Difference, Nothing, _) | (CsgOp::Difference, _, Everything) => Nothing,
         (CsgOp::Difference, left, Nothing) => left,
-        (CsgOp::Difference, Everything, Some(b)) => both(op, vec![EVERYTHING], b),
+        (CsgOp::Difference, Everything, Some(b)) => both(op, vec![S::EVERYTHING], b),
         (op, Some(a), Some(b)) => both(op, a, b),
     }
 }
 
-fn both(op: CsgOp, mut a: Vec<CellStep>, b: Vec<CellStep>) -> Left {
+fn both<S: OfTree>(op: CsgOp, mut a: Vec<S>, b: Vec<S>) -> Left<S> {
     a.extend(b);
-    a.push(CellStep::Join(op));
+    a.push(S::join(op));
     Left::Some(a)
 }
 
-const EVERYTHING: CellStep = CellStep::Leaf { first: 0, count: 0 };
 /// How far around a cell its part of the tree serves, in half edges.
 const REACH: f64 = 1.0;
 /// Levels below the whole: the smallest cells reach farther than a common neighbourhood.

@@ -46,6 +46,15 @@ impl Curved {
         Self { kind, turn_LB, shift_L, stretch, least_radius, place }
     }
 
+    pub(super) fn kind(&self) -> Kind {
+        self.kind
+    }
+
+    /// Turn and shift from B to L.
+    pub(super) fn map(&self) -> (Matrix3<f64>, Vector3<f64>) {
+        (self.turn_LB, self.shift_L)
+    }
+
     /// A point as seen from the surface's origin, along B if that will do.
     #[inline(always)]
     fn seen(&self, point_B: &Vector3<f64>) -> Vector3<f64> {
@@ -64,6 +73,10 @@ impl Curved {
         let scale_m = self.turn_LB.column(0).norm_squared();
         let skew = self.turn_LB.tr_mul(&self.turn_LB) - Matrix3::identity() * scale_m;
         skew.amax() <= SKEW * scale_m
+    }
+
+    pub(super) fn is_convex(&self) -> bool {
+        !matches!(self.kind, Kind::Ring { .. })
     }
 
     pub(super) fn is_ball(&self) -> bool {

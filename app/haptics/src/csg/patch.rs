@@ -42,6 +42,14 @@ impl Patch {
         matches!(self, Self::Plane { .. })
     }
 
+    /// True if all between two points inside of it is inside: of all but rings.
+    pub(crate) fn is_convex(&self) -> bool {
+        match self {
+            Self::Plane { .. } => true,
+            Self::Curved(curved) => curved.is_convex(),
+        }
+    }
+
     /// Whether one of its points is nearest to a point inside of it and all others lead there downhill: it is not scaled
     /// by different factors.
     pub(crate) fn is_round(&self) -> bool {

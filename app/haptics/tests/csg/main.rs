@@ -8,6 +8,7 @@ mod joints;
 #[path = "../common/trees.rs"]
 mod trees;
 
+mod facets;
 mod feel;
 mod joined;
 mod oracle;

@@ -52,7 +52,6 @@ fn a_joined_solid_has_its_volume_and_its_sharp_edges() {
     let made = triangles(&spec, Some(&Shape::Csg(Arc::new(csg).into()))).unwrap();
     let volume = a.powi(3) - 2.0 / 3.0 * PI * r.powi(3);
     assert!((made.volume_m3() / volume - 1.0).abs() < 2e-3, "{}", made.volume_m3() / volume);
-    // A grid's step is 1.6 mm; planes that meet in a corner of the box say where it is.
     let corner = Point3::new(-0.5 * a, 0.5 * a, 0.5 * a);
     let nearest = made.places.iter().map(|place| (place - corner).norm()).fold(f64::INFINITY, f64::min);
     assert!(nearest < 1e-6, "{nearest}");
