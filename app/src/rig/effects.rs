@@ -1,7 +1,7 @@
 //! From what a scene says of fields, guides, magnetism and vibration to what rendering takes, within the limits of the
 //! rate that it will run at.
 
-use super::material::{Unfit, form};
+use super::material::Unfit;
 use super::{Rig, RigError};
 use haptics::{Entity, Field, Guide, Limits, Magnetism, ParameterError, Region, Track, Vibration};
 use world::{FieldKindSpec, FieldSpec, GuideSpec, SceneEntity, TrackSpec};
@@ -59,7 +59,7 @@ impl Rig {
 fn field(spec: &FieldSpec, limits: Result<Limits, ParameterError>) -> Result<Field, Unfit> {
     let limits = limits?;
     let region = match &spec.shape {
-        Some(shape) => Region::within(form(shape)?, spec.pose, spec.rim_m)?,
+        Some(shape) => Region::within(shape.form()?, spec.pose, spec.rim_m)?,
         None => Region::everywhere_turned(spec.pose),
     };
     Ok(match spec.kind {

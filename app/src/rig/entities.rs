@@ -71,7 +71,7 @@ impl Rig {
             AlgorithmSpec::ClassicGodObject => "classic",
             _ => return Ok(()),
         };
-        if !material::is_csg(&spec.shape) {
+        if !spec.shape.is_csg() {
             return Ok(());
         }
         Err(RigError::NotRendered { file: spec.file.to_path_buf(), line: spec.line, what, found })

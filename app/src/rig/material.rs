@@ -5,15 +5,12 @@ use super::solids::Solids;
 use haptics::mesh::Mesh;
 use haptics::passivity::{Passivity, PassivitySpec};
 use haptics::{
-    Algorithm, Capsule, Cone, Csg, CsgError, CsgPart, CsgTree, Cuboid, Cylinder, Ellipsoid, FaceMaterial,
-    FaceMaterials, Form, Friction, ParameterError, Plane, Scaled, Shading, ShadingForm, Shape, Sphere, Torus,
+    Algorithm, CsgError, Cuboid, FaceMaterial, FaceMaterials, Friction, ParameterError, Shading, ShadingForm,
+    Shape,
 };
-use nalgebra::Isometry3;
 use std::f64::consts::FRAC_PI_2;
 use std::sync::Arc;
-use world::{
-    AlgorithmSpec, CsgOp, CsgSpec, FrictionSpec, SceneEntity, ShadingFormSpec, ShadingSpec, ShapeSpec,
-};
+use world::{AlgorithmSpec, FrictionSpec, NoSolid, SceneEntity, ShadingFormSpec, ShadingSpec, ShapeSpec};
 
 /// Why something has no counterpart in rendering.
 pub(super) enum Unfit {
@@ -48,9 +45,13 @@ pub(super) fn passivity(spec: &world::PassivitySpec, period_s: f64) -> Result<Pa
     Passivity::new(passivity, period_s)
 }
 
-impl From<CsgError> for Unfit {
-    fn from(error: CsgError) -> Self {
-        Self::NoSolid(error)
+impl From<NoSolid> for Unfit {
+    fn from(why: NoSolid) -> Self {
+        match why {
+            NoSolid::Refused(error) => Self::Refused(error),
+            NoSolid::Unjoined(error) => Self::NoSolid(error),
+            NoSolid::Modelled(what) => Self::NotAvailable(what),
+        }
     }
 }
 
@@ -70,59 +71,9 @@ pub(super) fn shape(
             Some(nurbs) => Ok(Arc::clone(nurbs).into()),
             None => Err(Unfit::NotAvailable(format!("shape {spec:?}"))),
         },
-        spec if is_csg(spec) => Ok(solids.solid(spec)?.into()),
-        spec => Ok(Shape::Form(form(spec)?)),
+        spec if spec.is_csg() => Ok(solids.solid(spec)?.into()),
+        spec => Ok(Shape::Form(spec.form()?)),
     }
-}
-
-/// The solid of a shape that is joined of others.
-pub(super) fn csg(spec: &ShapeSpec) -> Result<Csg, Unfit> {
-    // As the only part of a tree it may be scaled like any other.
-    let tree = CsgTree::union([part(spec, Isometry3::identity())?]);
-    Ok(Csg::build(&tree)?)
-}
-
-/// Whether a shape is joined of others, scaled or not.
-pub(super) fn is_csg(spec: &ShapeSpec) -> bool {
-    match spec {
-        ShapeSpec::Scaled { shape, .. } => is_csg(shape),
-        spec => matches!(spec, ShapeSpec::Csg(_)),
-    }
-}
-
-fn part(spec: &ShapeSpec, pose: Isometry3<f64>) -> Result<CsgPart, Unfit> {
-    match spec {
-        ShapeSpec::Csg(spec) => Ok(CsgPart::tree(tree(spec)?, pose)),
-        ShapeSpec::Scaled { shape, scale } if is_csg(shape) => Ok(part(shape, pose)?.scaled(*scale)),
-        spec => Ok(CsgPart::new(form(spec)?, pose)),
-    }
-}
-
-fn tree(spec: &CsgSpec) -> Result<CsgTree, Unfit> {
-    let parts =
-        spec.children.iter().map(|child| part(&child.shape, child.pose)).collect::<Result<Vec<_>, _>>()?;
-    Ok(match spec.op {
-        CsgOp::Union => CsgTree::union(parts),
-        CsgOp::Intersection => CsgTree::intersection(parts),
-        CsgOp::Difference => CsgTree::difference(parts),
-    })
-}
-
-pub(super) fn form(spec: &ShapeSpec) -> Result<Form, Unfit> {
-    Ok(match *spec {
-        ShapeSpec::Plane { normal, offset_m } => Plane::new(normal.into_inner(), offset_m)?.into(),
-        ShapeSpec::Sphere { radius_m } => Sphere::new(radius_m)?.into(),
-        ShapeSpec::Box { size_m } => Cuboid::new(size_m)?.into(),
-        ShapeSpec::Cylinder { radius_m, length_m } => Cylinder::new(radius_m, length_m)?.into(),
-        ShapeSpec::Cone { radius_bottom_m, radius_top_m, length_m } => {
-            Cone::new(radius_bottom_m, radius_top_m, length_m)?.into()
-        }
-        ShapeSpec::Capsule { radius_m, length_m } => Capsule::new(radius_m, length_m)?.into(),
-        ShapeSpec::Torus { ring_radius_m, tube_radius_m } => Torus::new(ring_radius_m, tube_radius_m)?.into(),
-        ShapeSpec::Ellipsoid { radii_m } => Ellipsoid::new(radii_m)?.into(),
-        ShapeSpec::Scaled { ref shape, scale } => Scaled::new(form(shape)?, scale)?,
-        ref other => return Err(Unfit::NotAvailable(format!("shape {other:?}"))),
-    })
 }
 
 /// Materials of labelled faces of a mesh, in the order of their labels.

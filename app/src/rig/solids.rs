@@ -1,6 +1,6 @@
 //! Solids joined of others: each is built once for all entities that are alike, as a shelf's are.
 
-use super::material::{Unfit, csg};
+use super::material::Unfit;
 use haptics::Csg;
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -20,7 +20,7 @@ impl Solids {
         if let Some(built) = self.built.get(&said) {
             return Ok(Arc::clone(built));
         }
-        let built = Arc::new(csg(spec)?);
+        let built = Arc::new(spec.csg()?);
         self.built.insert(said, Arc::clone(&built));
         Ok(built)
     }

@@ -2,6 +2,7 @@
 
 use crate::rims;
 use crate::shapes;
+use crate::solids;
 use crate::triangles::Triangles;
 use crate::usual;
 use haptics::mesh::TriangleSoup;
@@ -188,7 +189,10 @@ impl<'s> Looks<'s> {
                 }
                 // What only a model knows is known of what is felt.
                 let model = felt.filter(|_| std::ptr::eq(*spec, &raw const part.entity.shape));
-                let made = Arc::new(shapes::triangles(spec, model)?);
+                let made = Arc::new(match model {
+                    None if spec.is_csg() => solids::triangles(&spec.csg().ok()?),
+                    model => shapes::triangles(spec, model)?,
+                });
                 self.shapes.push((spec, Arc::clone(&made)));
                 Some(made)
             }

@@ -13,5 +13,6 @@ mod mouse_hand;
 mod overlay;
 mod pictures;
 mod shapes;
+mod stages;
 mod textures;
 mod usual;
