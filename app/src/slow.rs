@@ -196,7 +196,7 @@ impl SlowSide {
             self.events.deliver(row.run_tick);
             let requested = self.on_request.as_mut().and_then(OnRequest::recorder);
             for recorder in self.recorders.iter_mut().chain(requested) {
-                recorder.send(&row, bodies);
+                recorder.send(&row, bodies, placed);
             }
             if let Some(snapshots) = &mut self.snapshots {
                 snapshots.look(&row, bodies, placed);

@@ -6,7 +6,9 @@
 //! | `/events` | `phantom3.Event` | when something happens |
 //! | `/orders` | `phantom3.Order` | when somebody ordered something; not there if nobody did |
 //! | `/scene`, of large scenes also `/scene/2` and so on | `foxglove.SceneUpdate` | once |
-//! | `/frames` | `foxglove.FrameTransforms` | 50 times a second |
+//! | `/frames` | `foxglove.FrameTransforms`, of what moves by itself and of fingers | 50 times a second |
+//! | `/frames/fixed` | `foxglove.FrameTransforms`, of everything else | once |
+//! | `/frames/moved` | `foxglove.FrameTransforms`, of what orders have moved of that | when it moves; not there if nothing did |
 //! | `/fingers` | `foxglove.SceneUpdate` | 50 times a second |
 //!
 //! Model: messages are encoded as Protocol Buffers and gathered into chunks of half a second of the run. A chunk goes to
@@ -27,6 +29,7 @@ use super::view::View;
 use super::wire::Message;
 use crate::book::Book;
 use crate::columns::Names;
+use crate::displaced::Placed;
 use crate::recording::RecordingError;
 use crate::row::{BodyRow, Row};
 use io_driver::device::run_time_s;
@@ -59,6 +62,8 @@ const PICTURE_NS: u64 = 20_000_000;
 pub(super) const ABOUT: &str = "phantom3.run";
 pub(super) const COLUMNS: &str = "phantom3.columns";
 pub(super) const END: &str = "phantom3.end";
+/// The schema of channels that tell where frames are.
+const FRAMES: &str = "foxglove.FrameTransforms";
 /// The channel of ticks.
 pub(super) const TICK_TOPIC: &str = "/tick";
 /// And that of orders.
@@ -79,6 +84,8 @@ pub struct McapFile {
     /// The chunk has a tick with all bodies, and the newest one these.
     chunk_has_all: bool,
     last_bodies: Vec<BodyRow>,
+    /// Things that are no bodies and have been moved, as they were told last.
+    last_placed: Vec<Placed>,
     /// What the chunk has, and its first tick.
     chunk_bytes: usize,
     chunk_rows: u64,
@@ -104,6 +111,8 @@ struct Channels {
     /// One for each part, so that players which go back to the last message of each channel show all of them.
     scene: Vec<u16>,
     frames: u16,
+    fixed: u16,
+    moved: Option<u16>,
     fingers: u16,
 }
 
@@ -158,6 +167,7 @@ impl McapFile {
             sequence: 0,
             chunk_has_all: false,
             last_bodies: Vec::new(),
+            last_placed: Vec::new(),
             chunk_bytes: 0,
             chunk_rows: 0,
             chunk_began: 0,
@@ -181,6 +191,10 @@ impl McapFile {
         self.beginning.is_held.store(may_wait, Ordering::Relaxed);
         for (channel, part) in self.channels.scene.clone().into_iter().zip(scene.iter()) {
             self.put(channel, begins, part)?;
+        }
+        let fixed = std::mem::take(&mut self.view.fixed);
+        if !fixed.is_empty() {
+            self.put(self.channels.fixed, begins, &fixed)?;
         }
         self.beginning.is_held.store(false, Ordering::Relaxed);
         if may_wait { Ok(()) } else { self.end_chunk() }
@@ -214,11 +228,11 @@ impl McapFile {
         has_content.load(Ordering::Relaxed) && !has_rows.load(Ordering::Relaxed)
     }
 
-    /// Appends a row and its bodies.
+    /// Appends a row and its bodies; `placed` is what else has been moved, where it stands.
     ///
     /// # Errors
     /// If it or rows before it cannot be written.
-    pub fn append(&mut self, row: &Row, bodies: &[BodyRow]) -> Result<(), RecordingError> {
+    pub fn append(&mut self, row: &Row, bodies: &[BodyRow], placed: &[Placed]) -> Result<(), RecordingError> {
         self.beginning.has_rows.store(true, Ordering::Relaxed);
         if self.chunk_rows == 0 {
             self.chunk_began = row.run_tick;
@@ -227,7 +241,7 @@ impl McapFile {
             self.flush()?;
             self.chunk_began = row.run_tick;
         }
-        let written = self.put_row(row, bodies);
+        let written = self.put_row(row, bodies, placed);
         self.chunk_rows += 1;
         self.last_in_chunk = row.run_tick;
         let written = self.failure.take().map_or(written, Err);
@@ -309,6 +323,17 @@ impl McapFile {
         }
     }
 
+    /// Made for the first thing that is moved.
+    fn moved_channel(&mut self) -> Result<u16, McapError> {
+        if let Some(channel) = self.channels.moved {
+            return Ok(channel);
+        }
+        let set = schema::descriptors(&self.names);
+        let channel = add_channel(&mut self.writer, "/frames/moved", FRAMES, &set)?;
+        self.channels.moved = Some(channel);
+        Ok(channel)
+    }
+
     /// Made for the first order.
     fn order_channel(&mut self) -> Result<u16, McapError> {
         if let Some(channel) = self.channels.orders {
@@ -362,7 +387,7 @@ impl McapFile {
         }
     }
 
-    fn put_row(&mut self, row: &Row, bodies: &[BodyRow]) -> Result<(), McapError> {
+    fn put_row(&mut self, row: &Row, bodies: &[BodyRow], placed: &[Placed]) -> Result<(), McapError> {
         let mut message = std::mem::take(&mut self.message);
         message.clear();
         if self.chunk_bytes + MOST_BODY_BYTES * bodies.len() > MOST_CHUNK_BYTES {
@@ -383,6 +408,15 @@ impl McapFile {
             message.clear();
             self.view.frames(&mut message, time_ns, row, bodies, &self.names);
             written = written.and_then(|()| self.put(self.channels.frames, row.run_tick, message.bytes()));
+            if placed != self.last_placed {
+                self.last_placed.clear();
+                self.last_placed.extend_from_slice(placed);
+                message.clear();
+                self.view.moved(&mut message, time_ns, placed);
+                let channel = self.moved_channel();
+                let put = channel.and_then(|channel| self.put(channel, row.run_tick, message.bytes()));
+                written = written.and(put);
+            }
             message.clear();
             self.view.fingers(&mut message, time_ns, row, &self.names);
             written = written.and_then(|()| self.put(self.channels.fingers, row.run_tick, message.bytes()));
@@ -480,7 +514,9 @@ fn begin(
         scene: (1..=scene_parts)
             .map(|part| channel(&scene_topic(part), "foxglove.SceneUpdate"))
             .collect::<Result<_, _>>()?,
-        frames: channel("/frames", "foxglove.FrameTransforms")?,
+        frames: channel("/frames", FRAMES)?,
+        fixed: channel("/frames/fixed", FRAMES)?,
+        moved: None,
         fingers: channel("/fingers", "foxglove.SceneUpdate")?,
     })
 }
@@ -632,7 +668,7 @@ mod tests {
         let mut file = McapFile::create(file, names, 1_000_000, &about, view).expect("room");
         for run_tick in 0..3 {
             let row = Row { run_tick, ..Row::empty() };
-            file.append(&row, &[]).expect("room");
+            file.append(&row, &[], &[]).expect("room");
         }
         assert_eq!(file.finish().expect("room"), 3);
         path
@@ -657,6 +693,47 @@ mod tests {
         for topic in ["/scene", "/scene/2", "/scene/3"] {
             assert!(summary.channels.values().any(|channel| channel.topic == topic), "{topic}");
         }
+    }
+
+    #[test]
+    fn what_an_order_moves_is_told_where_it_stands() {
+        let directory = tempfile::tempdir().expect("a directory");
+        let path = directory.path().join("r.mcap");
+        let text =
+            "[[finger]]\n[[entity]]\nname = \"plate\"\nshape = { kind = \"sphere\", radius_m = 0.05 }\n";
+        let scene = world::Scene::parse(text, Path::new("scene.toml")).expect("a scene");
+        let ball = haptics::Sphere::new(0.05).expect("a ball");
+        let at = |y: f64| nalgebra::Isometry3::translation(0.0, y, 0.0);
+        let entities = [haptics::Entity::new(ball, at(0.0), 1000.0).expect("stiff")];
+        let view = View::new(&scene, &entities, true);
+        let names = Names { fingers: vec!["f0".into()], ..Names::default() };
+        let mut about = About::default();
+        about.tell("period_ns", "1000000".into());
+        let opened = Opened::recording(&path).expect("a file");
+        let mut file = McapFile::create(opened, names, 1_000_000, &about, view.clone()).expect("room");
+        for run_tick in 0..100 {
+            let placed = [(0, at(if run_tick < 70 { 0.1 } else { 0.2 }))];
+            let row = Row { run_tick, ..Row::empty() };
+            file.append(&row, &[], if run_tick < 30 { &[] } else { &placed }).expect("room");
+        }
+        assert_eq!(file.finish().expect("room"), 100);
+        let bytes = std::fs::read(&path).expect("there");
+        let of = |topic: &str| -> Vec<(u64, Vec<u8>)> {
+            let all = mcap::MessageStream::new(&bytes).expect("sound").map(|message| message.expect("sound"));
+            let all = all.filter(|message| message.channel.topic == topic);
+            all.map(|message| (message.log_time / 1_000_000, message.data.to_vec())).collect()
+        };
+        let told = |ms: u64, y: f64| {
+            let mut message = Message::new();
+            view.moved(&mut message, ms * 1_000_000, &[(0, at(y))]);
+            (ms, message.into_bytes())
+        };
+        assert_eq!(of("/frames/fixed"), [told(0, 0.0)]);
+        // With the next of 50 pictures a second.
+        assert_eq!(of("/frames/moved"), [told(40, 0.1), told(80, 0.2)]);
+        let scenes = of("/scene");
+        let frame = b"object/plate";
+        assert!(scenes.len() == 1 && scenes[0].1.windows(frame.len()).any(|bytes| bytes == frame));
     }
 
     #[test]

@@ -5,6 +5,7 @@
 use super::content::ContentState;
 use super::events_file::EventsFile;
 use super::mcap_file::McapFile;
+use crate::displaced::Placed;
 use crate::recording::{Recording, RecordingError};
 use crate::row::{BodyRow, Row};
 use std::sync::Arc;
@@ -57,10 +58,15 @@ impl RecordFile {
         }
     }
 
-    pub(super) fn append(&mut self, row: &Row, bodies: &[BodyRow]) -> Result<(), RecordingError> {
+    pub(super) fn append(
+        &mut self,
+        row: &Row,
+        bodies: &[BodyRow],
+        placed: &[Placed],
+    ) -> Result<(), RecordingError> {
         match self {
             Self::Csv(file) => file.append(row, bodies),
-            Self::Mcap(file) => file.append(row, bodies),
+            Self::Mcap(file) => file.append(row, bodies, placed),
             Self::Events(file) => {
                 file.start();
                 Ok(())

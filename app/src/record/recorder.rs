@@ -15,6 +15,7 @@ use super::backpressure::{Backpressure, Progress, Wait};
 use super::content::{Content, ContentState};
 use super::destination::shown;
 use super::record_file::RecordFile;
+use crate::displaced::Placed;
 use crate::fast_loop::WhenFull;
 use crate::progress::{SOON, StatusLine};
 use crate::recording::RecordingError;
@@ -116,6 +117,9 @@ pub struct Recorder {
     known: Vec<Option<BodyRow>>,
     /// Those that are not so, by their numbers.
     changed: Vec<(u32, BodyRow)>,
+    /// Things that are no bodies and have been moved, as the other end knows them; and those that are not so.
+    known_placed: Vec<Placed>,
+    changed_placed: Vec<Placed>,
     backpressure: Backpressure,
     period_ns: u64,
     /// The row that was sent last.
@@ -201,6 +205,8 @@ impl Recorder {
             events,
             known,
             changed,
+            known_placed: Vec::new(),
+            changed_placed: Vec::new(),
             backpressure,
             period_ns,
             last_tick: 0,
@@ -240,8 +246,8 @@ impl Recorder {
         self.events.take()
     }
 
-    /// Hands a row over.
-    pub fn send(&mut self, row: &Row, bodies: &[BodyRow]) {
+    /// Hands a row over; `placed` is what is no body and has been moved, where it stands.
+    pub fn send(&mut self, row: &Row, bodies: &[BodyRow], placed: &[Placed]) {
         if self.is_given_up() {
             self.lost += 1;
             self.untold += 1;
@@ -254,6 +260,7 @@ impl Recorder {
         self.changed.clear();
         let numbered = (0..).zip(bodies.iter().copied()).zip(&self.known);
         self.changed.extend(numbered.filter(|((_, is), was)| Some(*is) != **was).map(|(body, _)| body));
+        self.note_placed(placed);
         if !self.hand_over(row) {
             self.leave_out();
             return;
@@ -278,10 +285,30 @@ impl Recorder {
         self.sent > 0
     }
 
+    /// Changes go with the next row that is handed over.
+    fn note_placed(&mut self, placed: &[Placed]) {
+        if self.known_placed == placed {
+            return;
+        }
+        let waiting = self.changed_placed.len();
+        for (at, &now) in placed.iter().enumerate() {
+            // Who was moved later is told behind the others.
+            if self.known_placed.get(at) == Some(&now) {
+                continue;
+            }
+            match self.changed_placed[..waiting].iter_mut().find(|(entity, _)| *entity == now.0) {
+                Some(waits) => waits.1 = now.1,
+                None => self.changed_placed.push(now),
+            }
+        }
+        self.known_placed.clear();
+        self.known_placed.extend_from_slice(placed);
+    }
+
     /// `false`: there is no room, and will be none as long as somebody waits.
     fn hand_over(&mut self, row: &Row) -> bool {
         let mut wait = Wait::begin(&self.shared.progress);
-        while !self.rows.send(*row, &self.changed) {
+        while !self.rows.send_with(*row, &self.changed, &mut self.changed_placed) {
             let thread = &self.thread;
             let progress = &self.shared.progress;
             if thread.is_finished() || !wait.goes_on(progress, &self.backpressure, thread.thread()) {
@@ -500,10 +527,10 @@ impl RecorderThread {
         loop {
             // Looked at first: what was sent before is then in the queue.
             let is_closing = self.shared.is_closing.load(Ordering::Acquire);
-            while let Some((row, bodies)) = rows.receive() {
+            while let Some((row, _)) = rows.receive() {
                 self.shared.progress.take();
                 last = row.run_tick;
-                let mut written = self.append(&row, bodies);
+                let mut written = self.append(&row, rows.bodies(), rows.placed());
                 if row.run_tick.saturating_sub(flushed).saturating_mul(self.period_ns) >= FLUSH_NS {
                     flushed = row.run_tick;
                     written = written.and_then(|()| self.file.as_mut().map_or(Ok(()), RecordFile::flush));
@@ -555,9 +582,9 @@ impl RecorderThread {
         Err(error)
     }
 
-    fn append(&mut self, row: &Row, bodies: &[BodyRow]) -> Result<(), RecordingError> {
+    fn append(&mut self, row: &Row, bodies: &[BodyRow], placed: &[Placed]) -> Result<(), RecordingError> {
         self.tell_lost(row.run_tick, row.run_tick);
-        self.file.as_mut().map_or(Ok(()), |file| file.append(row, bodies))?;
+        self.file.as_mut().map_or(Ok(()), |file| file.append(row, bodies, placed))?;
         self.write_events(row.run_tick)
     }
 
@@ -625,7 +652,7 @@ mod tests {
         // Its thread looks for gaps before each row.
         let standing_still = shared.gaps();
         for run_tick in 0..10 {
-            recorder.send(&Row { run_tick, ..Row::empty() }, &[]);
+            recorder.send(&Row { run_tick, ..Row::empty() }, &[], &[]);
         }
         let recorded = recorder.finish();
         assert!(recorded.is_left_behind && recorded.is_as_before);

@@ -9,6 +9,7 @@ use super::destination::RunFormat;
 use super::foxglove::{Rgba, WORLD, arrow, cube, cylinder, frame_in_world, scene_entity, sphere, triangles};
 use super::wire::Message;
 use crate::columns::Names;
+use crate::displaced::Placed;
 use crate::per_shape::PerShape;
 use crate::row::{BodyRow, FingerRow, Row};
 use haptics::{Entity, Shape};
@@ -45,6 +46,10 @@ const NORMAL_M: f64 = 0.03;
 pub struct View {
     /// All entities, as one `foxglove.SceneUpdate` or, if that is too large, as several. One copy serves all recordings.
     pub(super) scene: Arc<[Vec<u8>]>,
+    /// A `foxglove.FrameTransforms` of all that does not move by itself, where it is at first.
+    pub(super) fixed: Arc<[u8]>,
+    /// Names of the entities, where there is a picture.
+    names: Arc<[String]>,
     /// Radius of each finger (m); 0 for a point.
     radii_m: Vec<f64>,
 }
@@ -53,7 +58,10 @@ impl View {
     /// Of a scene, as it is rendered; its picture is made only for recordings that have one, for it may take long and much memory.
     pub fn new(scene: &Scene, entities: &[Entity], has_picture: bool) -> Self {
         let picture = || drawn(scene, entities, &mut Drawn::default(), MOST_PART_BYTES);
+        let names = || scene.entities.iter().map(|spec| spec.name.clone()).collect::<Vec<_>>();
         Self {
+            fixed: if has_picture { fixed(scene).into_bytes() } else { Vec::new() }.into(),
+            names: has_picture.then(names).unwrap_or_default().into(),
             scene: has_picture.then(picture).unwrap_or_default().into(),
             radii_m: scene.fingers.iter().map(|finger| finger.radius_m).collect(),
         }
@@ -76,6 +84,16 @@ impl View {
             let turned = if finger.has_orientation { [w, x, y, z] } else { [1.0, 0.0, 0.0, 0.0] };
             let turned = nalgebra::Quaternion::new(turned[0], turned[1], turned[2], turned[3]);
             frame_in_world(out, time_ns, &format!("finger/{name}"), &finger.hip, &turned);
+        }
+    }
+
+    /// A `foxglove.FrameTransforms` of what is no body and has been moved.
+    pub(super) fn moved(&self, out: &mut Message, time_ns: u64, placed: &[Placed]) {
+        for (entity, pose) in placed {
+            if let Some(name) = self.names.get(*entity as usize) {
+                let Isometry3 { translation, rotation } = pose;
+                frame_in_world(out, time_ns, &frame_of(name), &translation.vector, rotation);
+            }
         }
     }
 
@@ -110,13 +128,10 @@ pub fn shows_scene(files: &[PathBuf]) -> bool {
 fn drawn<'e>(scene: &Scene, entities: &'e [Entity], made: &mut Drawn<'e>, most_bytes: usize) -> Vec<Vec<u8>> {
     let (mut parts, mut out) = (Vec::new(), Message::new());
     for (spec, entity) in scene.entities.iter().zip(entities) {
-        let moves = spec.motion.is_some();
-        let frame = if moves { frame_of(&spec.name) } else { WORLD.into() };
-        let pose = if moves { Isometry3::identity() } else { spec.pose };
-        let rgba = if moves { MOVING } else { SOLID };
+        let rgba = if spec.motion.is_some() { MOVING } else { SOLID };
         let before = out.bytes().len();
-        scene_entity(&mut out, 0, &frame, &spec.name, |out| {
-            draw(out, &spec.shape, &entity.shape, made, (&pose, rgba));
+        scene_entity(&mut out, 0, &frame_of(&spec.name), &spec.name, |out| {
+            draw(out, &spec.shape, &entity.shape, made, (&Isometry3::identity(), rgba));
         });
         if before > 0 && out.bytes().len() > most_bytes {
             parts.push(out.cut(before));
@@ -124,6 +139,16 @@ fn drawn<'e>(scene: &Scene, entities: &'e [Entity], made: &mut Drawn<'e>, most_b
     }
     parts.push(out.into_bytes());
     parts
+}
+
+/// A `foxglove.FrameTransforms` of all entities that do not move by themselves: orders may move them.
+fn fixed(scene: &Scene) -> Message {
+    let mut out = Message::new();
+    for spec in scene.entities.iter().filter(|spec| spec.motion.is_none()) {
+        let Isometry3 { translation, rotation } = &spec.pose;
+        frame_in_world(&mut out, 0, &frame_of(&spec.name), &translation.vector, rotation);
+    }
+    out
 }
 
 /// What the surface is like where a finger of this radius touches it: the normal, and the friction circle in the tangent plane.
