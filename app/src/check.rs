@@ -20,6 +20,7 @@ mod summary;
 mod suspicions;
 mod together;
 mod warnings;
+mod whereabouts;
 
 use crate::loading::while_reading;
 use crate::outputs;

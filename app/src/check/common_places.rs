@@ -3,8 +3,8 @@
 //! Model: a place is led to where each of a group is felt, in turn and over again; if they overlap, it ends where all of
 //! them are felt (of convex ones always, by alternating projections). A group is made greedily: from one effect, or from each
 //! pair of a few, it takes every other one that is felt there with the rest.
-//! Cost: effects times effects times the size of a group; entities are asked once for each effect, and led to where that one
-//! reaches them.
+//! Cost: effects times effects times the size of a group; entities are asked once for each effect with an end, and led to where
+//! that one reaches them.
 
 #![allow(non_snake_case)] // Frames are capital letters.
 
@@ -25,6 +25,10 @@ impl Effect<'_> {
             Self::Field(field) => field.region().felt_near(place_W),
             Self::Guide(guide) => guide.felt_near(place_W),
         }
+    }
+
+    fn is_everywhere(&self) -> bool {
+        matches!(self, Self::Field(field) if field.region().is_everywhere())
     }
 
     fn is_felt_at(&self, place_W: &Vector3<f64>) -> bool {
@@ -76,10 +80,10 @@ pub(super) fn directions() -> impl Iterator<Item = Vector3<f64>> {
     all.filter(|d| *d != Vector3::zeros()).map(|d| d.normalize())
 }
 
-/// Places of groups of effects, and of effects with entities.
-pub(super) fn common_places(effects: &[Effect<'_>], entities: &[Entity]) -> Vec<Vector3<f64>> {
+/// Places of groups of effects.
+pub(super) fn common_places(effects: &[Effect<'_>]) -> Vec<Vector3<f64>> {
     let mut places = Vec::new();
-    for (at, first) in effects.iter().enumerate() {
+    for at in 0..effects.len() {
         let alone = vec![at];
         let begins: Vec<Vec<usize>> = if effects.len() > FEW {
             vec![alone]
@@ -88,9 +92,50 @@ pub(super) fn common_places(effects: &[Effect<'_>], entities: &[Entity]) -> Vec<
         };
         let place = |begin| Some(group_from(effects, begin)?.1);
         places.extend(begins.into_iter().filter_map(place));
-        places.extend(entities.iter().filter_map(|entity| place_in(first, entity)));
     }
     places
+}
+
+/// Places of effects with entities; what is felt everywhere leads to the same.
+pub(super) fn places_in(effects: &[Effect<'_>], entities: &[Entity]) -> Vec<Vector3<f64>> {
+    let everywhere = effects.iter().find(|effect| effect.is_everywhere());
+    let looked_at = effects.iter().filter(|effect| !effect.is_everywhere()).chain(everywhere);
+    looked_at.flat_map(|effect| entities.iter().filter_map(|entity| place_in(effect, entity))).collect()
+}
+
+/// Places beside one at which guides pull most: in all directions, as far off as they do.
+pub(super) fn strained_places(guides: &[Guide]) -> Vec<Vector3<f64>> {
+    let mut distances: Vec<f64> = guides.iter().map(Guide::strained_m).collect();
+    distances.sort_by(f64::total_cmp);
+    distances.dedup();
+    let every = distances.len().div_ceil(MOST_DISTANCES).max(1);
+    let distances: Vec<f64> = distances.into_iter().rev().step_by(every).collect();
+    let effects: Vec<Effect<'_>> = guides.iter().map(Effect::Guide).collect();
+    let about = |at: usize| Some(group_from(&effects, vec![at])?.1);
+    let off = |place_W: Vector3<f64>| {
+        let all = distances.iter().flat_map(move |far_m| directions().map(move |along| along * *far_m));
+        all.map(move |off_W| place_W + off_W)
+    };
+    let every_guide = guides.len().div_ceil(MOST_STRAINED).max(1);
+    (0..guides.len()).step_by(every_guide).filter_map(about).flat_map(off).collect()
+}
+
+/// The place to which a force leads from another one: always to the neighbour with the larger one, near or far.
+pub(super) fn climbed(force_n: impl Fn(&Vector3<f64>) -> f64, from_W: &Vector3<f64>) -> Vector3<f64> {
+    let (mut place_W, mut most_n) = (*from_W, force_n(from_W));
+    for halving in 0..CLIMBS {
+        let step_m = FARTHEST_M / f64::from(1 << halving);
+        for _ in 0..STEPS {
+            let beside =
+                directions().map(|along| place_W + along * step_m).map(|at_W| (at_W, force_n(&at_W)));
+            let Some((at_W, here_n)) = beside.max_by(|a, b| a.1.total_cmp(&b.1)) else { break };
+            if here_n <= most_n * (1.0 + LEAST_GAIN) {
+                break;
+            }
+            (place_W, most_n) = (at_W, here_n);
+        }
+    }
+    place_W
 }
 
 /// These and as many others as can be found that are felt at one place, and the place; `None`: these have none in common.
@@ -135,13 +180,28 @@ fn place_in(effect: &Effect<'_>, entity: &Entity) -> Option<Vector3<f64>> {
     };
     let mut place_W = centre_W;
     for _ in 0..ROUNDS {
+        let before_W = place_W;
         place_W = below(&effect.led(&place_W));
+        if (place_W - before_W).norm() < ARRIVED_M {
+            break;
+        }
     }
     effect.is_felt_at(&place_W).then_some(place_W)
 }
 
 /// Each pair of so many effects begins a group.
 const FEW: usize = 16;
+/// Different distances at which guides are strained, the largest among them.
+const MOST_DISTANCES: usize = 4;
+/// Guides beside whose places others are looked for.
+const MOST_STRAINED: usize = 32;
+/// Steps of climbing, each half as long as the one before, and how often one is made.
+const CLIMBS: u32 = 10;
+const STEPS: usize = 8;
+/// The first of them (m).
+const FARTHEST_M: f64 = 0.1;
+/// Of a force: less is no climb.
+const LEAST_GAIN: f64 = 1e-6;
 /// Of leading a place.
 const ROUNDS: usize = 20;
 const ARRIVED_M: f64 = 1e-6;

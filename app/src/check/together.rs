@@ -5,16 +5,19 @@
 //! `K = sum k n n'`, effects as their [`Gains`]; masses of inertial fields as numbers. The largest eigenvalue is what the
 //! loop feels along its axis. Contacts are judged by what the loop stands, as single ones are; effects, and the damping of
 //! everything, by the [`Limits`] that single ones are refused above: each counts by its share of its own limit. Forces of
-//! constant fields add up as vectors, and vibrations with their amplitudes along the normals, to and fro; their sum is judged by
-//! what one field may pull.
+//! constant fields, guides and magnets add up as vectors, and vibrations with their amplitudes along the normals, to and fro;
+//! their sum is judged by what one field may pull.
 //! Cost: some hundred places for each thing that others reach into, and none for things that lie apart; of heaps, one in so many
 //! of these that all things are touched [`MOST_LOOKS`] times or less, which is told; of effects, as many groups as there are
 //! effects, or pairs of a few, and of constant fields one more for each, along its force.
 
 #![allow(non_snake_case)] // Frames are capital letters.
 
-use super::common_places::{Effect, common_places, directions, forceful_places};
+use super::common_places::{
+    Effect, climbed, common_places, directions, forceful_places, places_in, strained_places,
+};
 use super::warnings::Stands;
+use super::whereabouts::Whereabouts;
 use crate::rig::{Rig, in_words};
 use haptics::{
     Entity, Field, FieldKind, Finger, Gains, Guide, Hip, Limits, MOST_FORCE_N, Shape, Surface, WORLD,
@@ -29,7 +32,9 @@ pub(super) fn too_much(rig: &Rig, entities: &[Entity], stands: &mut Stands) -> V
     let mut found = Found::default();
     let (near_all, radii) = (neighbours(entities), radii(rig));
     let every = every(&near_all, radii.len());
-    let common: Vec<_> = world.common_places().into_iter().chain(world.forceful_places()).collect();
+    let common = world.places_of_effects();
+    let looks = common.len() * radii.len() * (world.fields.len() + world.guides.len() + FEW_THINGS);
+    let every_common = looks.div_ceil(MOST_COMMON_LOOKS).max(1);
     for radius_m in radii {
         for (index, near) in near_all.iter().enumerate().filter(|(_, near)| !near.is_empty()) {
             let above = drawn_at(&entities[index], radius_m);
@@ -38,7 +43,7 @@ pub(super) fn too_much(rig: &Rig, entities: &[Entity], stands: &mut Stands) -> V
                 world.judge((near, entities[index].space), radius_m, &place_W, stands, &mut found);
             }
         }
-        for place_W in &common {
+        for place_W in common.iter().step_by(every_common) {
             let near = world.near(place_W, radius_m);
             world.judge((&near, WORLD), radius_m, place_W, stands, &mut found);
         }
@@ -47,6 +52,12 @@ pub(super) fn too_much(rig: &Rig, entities: &[Entity], stands: &mut Stands) -> V
     if every > 1 {
         told.push(format!(
             "so much reaches into other things here that one place in {every} was looked at for what is too strong together"
+        ));
+    }
+    if every_common > 1 {
+        told.push(format!(
+            "so many fields and guides meet so many things here that one place in {every_common} of these was looked at for what \
+             is too strong together"
         ));
     }
     told
@@ -67,6 +78,8 @@ struct World<'a> {
     guides: Vec<Guide>,
     /// Of entities' magnets and damping, of each field and of each guide.
     limits: (Limits, Vec<Limits>, Vec<Limits>),
+    /// Of entities of the world itself that fingers feel, with what their magnets reach.
+    whereabouts: Whereabouts,
 }
 
 /// A kind of sum, with what it does where it is too large and its unit.
@@ -94,6 +107,8 @@ struct Touched {
     contacts: Vec<(usize, Gains)>,
     /// Of entities that draw it.
     magnets: Vec<(usize, Gains)>,
+    /// Their pulls (N).
+    drawn: Vec<(usize, Vector3<f64>)>,
     /// Amplitudes along the normals of what is touched (N).
     vibrations: Vec<(usize, Vector3<f64>)>,
 }
@@ -112,7 +127,15 @@ impl<'a> World<'a> {
         let of_guides =
             rig.scene.guides.iter().map(|spec| of_mass(spec.device_mass_kg)).collect::<Option<_>>()?;
         let limits = (of_mass(Limits::DEFAULT_DEVICE_MASS_KG)?, of_fields, of_guides);
-        Some(Self { rig, entities, fields, guides, limits })
+        let felt =
+            entities.iter().enumerate().filter(|(_, entity)| entity.is_haptic && entity.space == WORLD);
+        let ball = |entity: &Entity| {
+            let (centre_B, radius_m) = bounding_ball(&entity.shape)?;
+            let reach_m = entity.magnetism.map_or(0.0, |magnetism| magnetism.distance_m());
+            Some((entity.X_WB.transform_point(&centre_B.into()).coords, radius_m + reach_m))
+        };
+        let whereabouts = Whereabouts::of(felt.map(|(at, entity)| (at as u32, ball(entity))));
+        Some(Self { rig, entities, fields, guides, limits, whereabouts })
     }
 
     /// Things are counted through: entities, fields, guides.
@@ -139,7 +162,7 @@ impl<'a> World<'a> {
         if near.len() + effects.len() + pulls.len() + magnets < 2 {
             return;
         }
-        let Touched { contacts, magnets, vibrations } = self.touched((near, space), radius_m, place_W);
+        let Touched { contacts, magnets, drawn, vibrations } = self.touched((near, space), radius_m, place_W);
         let (_, of_fields, of_guides) = &self.limits;
         let mut add = |kind, sum: Option<(Vec<usize>, f64, f64)>| {
             if let Some((things, value, limit)) = sum {
@@ -170,6 +193,7 @@ impl<'a> World<'a> {
             Some((*thing, mass, limit_of(*thing).mass_kg(*cutoff_hz)))
         };
         add(Kind::Mass, beyond(&effects.iter().filter_map(mass).collect::<Vec<_>>()));
+        let pulls: Vec<_> = pulls.into_iter().chain(drawn).collect();
         add(Kind::Force, of_forces(&pulls, &vibrations));
     }
 
@@ -181,12 +205,14 @@ impl<'a> World<'a> {
         all.filter(|(_, gains)| *gains != Gains::default()).collect()
     }
 
-    /// Forces of constant fields at a place (N).
+    /// Forces of constant fields and of guides on a finger that rests at a place (N).
     fn pulls_at(&self, place_W: &Vector3<f64>) -> Vec<(usize, Vector3<f64>)> {
-        let pulls = self.fields.iter().enumerate().filter_map(|(at, field)| {
-            let FieldKind::Constant { force_W } = field.kind() else { return None };
-            Some((self.entities.len() + at, force_W * field.region().weight(place_W)))
+        let fields = self.fields.iter().map(|field| match field.kind() {
+            FieldKind::Constant { force_W } => force_W * field.region().weight(place_W),
+            _ => Vector3::zeros(),
         });
+        let guides = self.guides.iter().map(|guide| guide.force_at(place_W));
+        let pulls = fields.chain(guides).enumerate().map(|(at, pull_W)| (self.entities.len() + at, pull_W));
         pulls.filter(|(_, pull_W)| *pull_W != Vector3::zeros()).collect()
     }
 
@@ -209,19 +235,39 @@ impl<'a> World<'a> {
             Some((contact.entity, contact.normal_W * vibration.amplitude_n()))
         });
         let magnets = near.iter().map(|&at| at as usize).filter(|&at| probe.contact(at).is_none());
-        let magnets = magnets.map(|at| (at, self.entities[at].magnet_gains_at(place_W, radius_m)));
+        let magnets: Vec<usize> = magnets.filter(|&at| self.entities[at].magnetism.is_some()).collect();
+        let drawn = magnets.iter().map(|&at| (at, self.entities[at].magnet_force_at(place_W, radius_m)));
+        let drawn = drawn.filter(|(_, pull_W)| *pull_W != Vector3::zeros()).collect();
+        let magnets = magnets.iter().map(|&at| (at, self.entities[at].magnet_gains_at(place_W, radius_m)));
         Touched {
+            drawn,
             contacts: contacts.collect(),
             magnets: magnets.filter(|(_, gains)| *gains != Gains::default()).collect(),
             vibrations: vibrations.collect(),
         }
     }
 
-    /// Places that several effects have in common with each other and with entities.
-    fn common_places(&self) -> Vec<Vector3<f64>> {
+    /// Places that several effects have in common with each other and with entities, and those near them where forces are
+    /// largest.
+    fn places_of_effects(&self) -> Vec<Vector3<f64>> {
         let fields = self.fields.iter().map(Effect::Field);
         let effects: Vec<Effect<'_>> = fields.chain(self.guides.iter().map(Effect::Guide)).collect();
-        common_places(&effects, self.entities)
+        let mut places = common_places(&effects);
+        places.extend(self.forceful_places());
+        let mut strained = strained_places(&self.guides);
+        let force_n = |place_W: &Vector3<f64>| -> f64 {
+            self.pulls_at(place_W).iter().map(|(_, pull_W)| pull_W).sum::<Vector3<f64>>().norm()
+        };
+        // In nanonewtons.
+        strained.sort_by_cached_key(|place_W| std::cmp::Reverse((1e9 * force_n(place_W)) as u64));
+        strained.truncate(MOST_CLIMBED);
+        places.extend(strained);
+        places = once(places);
+        let every = places.len().div_ceil(MOST_CLIMBED).max(1);
+        let climbed: Vec<_> = places.iter().step_by(every).map(|place_W| climbed(force_n, place_W)).collect();
+        places.extend(climbed);
+        places.extend(places_in(&effects, self.entities));
+        once(places)
     }
 
     /// Places where constant forces add up that others take away from elsewhere.
@@ -235,17 +281,15 @@ impl<'a> World<'a> {
 
     /// Entities of the world itself that a finger may touch there.
     fn near(&self, place_W: &Vector3<f64>, radius_m: f64) -> Vec<u32> {
-        let is_near = |entity: &Entity| {
-            let reach_m = radius_m + entity.magnetism.map_or(0.0, |magnetism| magnetism.distance_m());
-            let ball = bounding_ball(&entity.shape);
-            ball.is_none_or(|(c, r)| {
-                (entity.X_WB.transform_point(&c.into()).coords - place_W).norm() <= r + reach_m
-            })
-        };
-        let felt =
-            self.entities.iter().enumerate().filter(|(_, entity)| entity.is_haptic && entity.space == WORLD);
-        felt.filter(|(_, entity)| is_near(entity)).map(|(at, _)| at as u32).collect()
+        self.whereabouts.near(place_W, radius_m)
     }
+}
+
+/// Each place once.
+fn once(mut places: Vec<Vector3<f64>>) -> Vec<Vector3<f64>> {
+    places.sort_by(|a, b| a.x.total_cmp(&b.x).then(a.y.total_cmp(&b.y)).then(a.z.total_cmp(&b.z)));
+    places.dedup_by(|a, b| (*a - *b).amax() < SAME_M);
+    places
 }
 
 /// Gains of contacts along the stiffest axis, and the loop's limits there.
@@ -475,6 +519,14 @@ const MOST_TOLD: usize = 10;
 const PLACES: usize = 1 + 26 * SHARES.len();
 /// Things that are touched, for all places and fingers together.
 const MOST_LOOKS: usize = 60_000;
+/// Effects that are asked at places of effects, for all places and fingers together.
+const MOST_COMMON_LOOKS: usize = 1_500_000;
+/// To touch what is at a place takes as long as to ask so many effects.
+const FEW_THINGS: usize = 32;
+/// Places from which a larger force is looked for.
+const MOST_CLIMBED: usize = 64;
+/// Nearer places are one (m).
+const SAME_M: f64 = 1e-9;
 
 #[cfg(test)]
 mod tests {

@@ -453,6 +453,79 @@ fn check_judges_constant_forces_and_vibrations_on_the_sum_at_a_place() {
     assert!(told.len() == 1 && told[0].starts_with("plate (12 N) may hum too hard"), "{told:?}");
 }
 
+#[test]
+fn check_adds_the_pulls_of_guides_magnets_and_thin_fields() {
+    let none: [String; 0] = [];
+    let line = |x: f64, more: &str| {
+        format!(
+            "[[guide]]\nkind = \"line\"\npoint_m = [{x}, 0.0, 0.0]\ndirection = [0.0, 0.0, 1.0]\nstiffness_n_per_m = 90.0\n\
+             damping_n_s_per_m = 0.1\nforce_limit_n = 10.0\n{more}"
+        )
+    };
+    assert_eq!(warnings(&line(0.0, "")), none);
+    let told = warnings(&line(0.0, "").repeat(10));
+    assert_eq!(told.len(), 1, "{told:?}");
+    assert!(told[0].contains("together may pull too hard"), "{told:?}");
+    assert!(told[0].contains("feels 100.0 N of them"), "{told:?}");
+    // A track in a field; and tracks far from each other, which let go.
+    let wind = "[[field]]\nkind = \"constant\"\nforce_n = [9.0, 0.0, 0.0]\n";
+    let told = warnings(&(line(0.0, "") + wind));
+    assert!(told.len() == 1 && told[0].contains("feels 19.0 N of them"), "{told:?}");
+    let lets_go = "break_away_n = 9.0\n";
+    assert_eq!(warnings(&(line(0.0, lets_go) + &line(3.0, lets_go))), none);
+    let magnet = |name: &str, y: f64| {
+        format!(
+            "[[entity]]\nname = \"{name}\"\nposition_m = [0.0, {y}, 0.0]\nstiffness_n_per_m = 100.0\n\
+             shape = {{ kind = \"box\", size_m = [0.1, 0.02, 0.1] }}\nmagnetism = {{ force_n = 9.0, distance_m = 0.3 }}\n"
+        )
+    };
+    assert_eq!(warnings(&magnet("below", 0.0)), none);
+    let told = warnings(&(magnet("below", 0.0) + wind));
+    assert!(told.iter().any(|it| it.contains("below, field[0] together may pull too hard")), "{told:?}");
+    // A field that is thinner than two rims is felt most in its middle.
+    let slab = |thick_m: f64| {
+        format!(
+            "[[field]]\nkind = \"constant\"\nforce_n = [9.0, 0.0, 0.0]\n\
+             shape = {{ kind = \"box\", size_m = [0.1, {thick_m}, 0.1] }}\n"
+        )
+        .repeat(10)
+    };
+    for (thick_m, value) in [(0.008, "80.6"), (0.006, "58.3"), (0.004, "31.7")] {
+        let told = warnings(&slab(thick_m));
+        assert!(told.len() == 1 && told[0].contains(&format!("feels {value} N of them")), "{told:?}");
+    }
+    // Two across each other, and a third one that takes away from both where all are.
+    let turned = |force: &str, at: &str| {
+        format!(
+            "[[field]]\nkind = \"constant\"\nforce_n = {force}\nposition_m = {at}\nrim_m = 0.002\n\
+             shape = {{ kind = \"box\", size_m = [0.05, 0.05, 0.05] }}\n"
+        )
+    };
+    let three = turned("[8.0, 0.0, 0.0]", "[0.0, 0.0, 0.0]")
+        + &turned("[0.0, 8.0, 0.0]", "[0.03, 0.03, 0.0]")
+        + &turned("[-3.0, -3.0, 7.0]", "[0.02, 0.02, 0.02]");
+    let told = warnings(&three);
+    assert!(
+        told.len() == 1 && told[0].starts_with("field[0], field[1] together may pull too hard"),
+        "{told:?}"
+    );
+    assert!(told[0].contains("feels 11.3 N of them"), "{told:?}");
+}
+
+#[test]
+fn check_of_fields_that_meet_thousands_of_things_takes_a_moment() {
+    let field = "[[field]]\nkind = \"constant\"\nforce_n = [0.1, 0.0, 0.0]\n".repeat(64);
+    let shelf = "[[entity]]\nname = \"c\"\ngrid = { count = [20, 15, 10], spacing_m = [0.1, 0.1, 0.1] }\n\
+                 shape = { kind = \"box\", size_m = [0.05, 0.05, 0.05] }\n";
+    let place = Workplace::new();
+    place.write("scene.toml", format!("[[finger]]\nstart_m = [0.0, -1.0, 0.0]\n{field}{shelf}"));
+    let begun = std::time::Instant::now();
+    let said = check(&place, &["scene.toml"]);
+    assert!(said.out.contains("can be run"), "{}", said.out);
+    // Half a second by itself, and thirty before; other tests share the cores.
+    assert!(begun.elapsed().as_secs() < 10, "{:?}", begun.elapsed());
+}
+
 /// Nothing falls.
 const WEIGHTLESS: &str = "gravity_m_s2 = [0.0, 0.0, 0.0]\n";
 

@@ -43,7 +43,7 @@ impl Field {
 }
 
 impl Region {
-    /// Nearest place, or about it, at which a field is felt in full.
+    /// Nearest place, or about it, at which a field is felt in full; in what is thinner than two rims, at which it is felt most.
     pub fn felt_near(&self, p_W: &Vector3<f64>) -> Vector3<f64> {
         let Some((form, X_WB, rim_m)) = self.parts() else { return *p_W };
         let p_B = point_into_body(X_WB, p_W);
@@ -51,9 +51,26 @@ impl Region {
             return *p_W;
         }
         let at = form.nearest(&p_B);
-        point_into_world(X_WB, &(at.point_B - at.normal_B * rim_m))
+        let within_m = |below_m: f64| -form.signed_distance(&(at.point_B - at.normal_B * below_m));
+        let below_m = if within_m(rim_m) < rim_m * FULL { deepest(within_m, rim_m) } else { rim_m };
+        point_into_world(X_WB, &(at.point_B - at.normal_B * below_m))
     }
 }
+
+/// Way below a surface, up to this one, at whose end it is farthest; on the way it is farther first, and then nearer.
+fn deepest(within_m: impl Fn(f64) -> f64, most_m: f64) -> f64 {
+    let (mut least, mut most) = (0.0, most_m);
+    for _ in 0..THIRDS {
+        let [near, far] = [least + (most - least) / 3.0, most - (most - least) / 3.0];
+        if within_m(near) < within_m(far) { least = near } else { most = far }
+    }
+    0.5 * (least + most)
+}
+
+/// Of a rim: nearer to its end a field is felt in full, but for rounding.
+const FULL: f64 = 1.0 - 1e-9;
+/// Each leaves two thirds of a way.
+const THIRDS: usize = 60;
 
 impl Guide {
     /// At this place, if it has the finger on the branch of its track that is nearest; nothing where it lets go.
@@ -80,6 +97,23 @@ impl Guide {
         Gains { stiffness_n_per_m, damping_n_s_per_m: across * damping, mass_kg: 0.0 }
     }
 
+    /// On a finger that rests at this place, if it has the finger on the branch of its track that is nearest \[N\]; nothing
+    /// where it lets go.
+    pub fn force_at(&self, p_W: &Vector3<f64>) -> Vector3<f64> {
+        let off_W = p_W - self.track().foot(p_W).point_W;
+        let (stretch_m, _) = self.strengths(off_W.norm());
+        let pull_n = (self.stiffness_n_per_m() * stretch_m).min(self.force_limit_n());
+        match off_W.try_normalize(0.0) {
+            Some(away_W) if !self.lets_go_at(stretch_m) => away_W * -pull_n,
+            _ => Vector3::zeros(),
+        }
+    }
+
+    /// Distance from its track at which it pulls most, or nearly \[m\].
+    pub fn strained_m(&self) -> f64 {
+        self.felt_between().1
+    }
+
     /// Nearest place, or about it, at which it is felt in full.
     pub fn felt_near(&self, p_W: &Vector3<f64>) -> Vector3<f64> {
         let foot = self.track().foot(p_W);
@@ -97,6 +131,13 @@ impl Guide {
 }
 
 impl Entity {
+    /// Pull of its magnetism on a finger of this radius at this place, that does not touch it \[N\].
+    pub fn magnet_force_at(&self, p_W: &Vector3<f64>, finger_radius_m: f64) -> Vector3<f64> {
+        let pulled =
+            self.magnetism.and_then(|magnetism| magnetism.pull((0, self), p_W, p_W, finger_radius_m));
+        pulled.map_or(Vector3::zeros(), |(pull, _)| pull.force_on_user_W)
+    }
+
     /// Of its magnetism on a finger of this radius at this place, that does not touch it.
     pub fn magnet_gains_at(&self, p_W: &Vector3<f64>, finger_radius_m: f64) -> Gains {
         let pulled =

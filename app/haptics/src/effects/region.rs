@@ -42,6 +42,11 @@ impl Region {
         Ok(Self { form: Some(form.into()), X_WB, rim_m: above_zero("rim_m", rim_m)? })
     }
 
+    /// True if it has no end.
+    pub fn is_everywhere(&self) -> bool {
+        self.form.is_none()
+    }
+
     /// How much of the field a point feels, 0 to 1.
     pub fn weight(&self, point_W: &Vector3<f64>) -> f64 {
         let Some(form) = &self.form else { return 1.0 };
