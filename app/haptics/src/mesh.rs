@@ -55,6 +55,7 @@ mod query;
 mod repair;
 mod report;
 mod rolling;
+mod sealed;
 mod sliver;
 mod soup;
 mod topology;
