@@ -87,7 +87,7 @@ fn watch(places: usize, pause: Duration) -> (Vec<Glimpse>, Tally) {
     let driver = Driver::start(&rig.driver_config(ClockMode::Real).to_toml());
     let attachment = driver.command();
     let step = rig.fast_step().expect("a step");
-    let (sender, receiver) = row_queue_of(places, step.bodies().len());
+    let (sender, receiver) = row_queue_of(places, usize::MAX, step.bodies().len());
     let notes = Notes::default();
     let Shown { moments, .. } = Shown::new(&rig, step.entities());
     let mut hub = Hub::new(Vec::new());
