@@ -10,18 +10,19 @@ use crate::rig::{Rig, in_words};
 use haptics::mesh::Sides;
 use haptics::{Entity, Shape};
 use nalgebra::Isometry3;
-use physics::{Aabb, ContactStiffness, Contacts};
+use physics::{Aabb, BroadPhase, ContactStiffness, Contacts};
 
 /// Warnings of them.
-pub(super) fn all(rig: &Rig, entities: &[Entity], pairs: &[Pair]) -> Vec<String> {
+pub(super) fn all(rig: &Rig, entities: &[Entity], pairs: &[Pair], boxes: &BroadPhase) -> Vec<String> {
     let mut weights_n = vec![0.0; entities.len()];
     let gravity_m_s2 = rig.scene.gravity_m_s2.norm();
     rig.masses(entities).for_each(|(index, mass_kg)| weights_n[index] = mass_kg * gravity_m_s2);
     let heaviest_kg = rig.masses(entities).map(|(_, mass_kg)| mass_kg).fold(0.0, f64::max);
-    let looks = Looks { rig, entities, contacts: rig.contacts(entities), weights_n, heaviest_kg };
+    let all_n = weights_n.iter().sum();
+    let looks = Looks { rig, entities, contacts: rig.contacts(entities), weights_n, all_n, heaviest_kg };
     let mut found = told(pairs.iter().filter_map(|pair| looks.overlap(pair)), "begin in each other");
     let up_W = -rig.scene.gravity_m_s2.try_normalize(0.0).unwrap_or_default();
-    let (stands, falls) = stands::all(entities, pairs, &looks.weights_n, &up_W);
+    let (stands, falls) = stands::all((entities, boxes), pairs, &looks.weights_n, &up_W);
     if !falls.is_empty() {
         let names: Vec<String> = falls.iter().map(|&index| rig.scene.entities[index].name.clone()).collect();
         found.push(format!(
@@ -50,6 +51,8 @@ struct Looks<'a> {
     entities: &'a [Entity],
     contacts: Contacts,
     weights_n: Vec<f64>,
+    /// Sum of them.
+    all_n: f64,
     heaviest_kg: f64,
 }
 
@@ -57,9 +60,8 @@ impl Looks<'_> {
     /// It begins deeper than all weights together bring it.
     fn overlap(&self, pair: &Pair) -> Option<String> {
         let (a, b, depth_m) = (pair.one, pair.other, -pair.gap_m);
-        let all_n: f64 = self.weights_n.iter().sum();
         let [name, other] = self.names([a, b]);
-        (depth_m > (all_n / self.stiffness_n_per_m(a, b)).max(LEAST_DEPTH_M))
+        (depth_m > (self.all_n / self.stiffness_n_per_m(a, b)).max(LEAST_DEPTH_M))
             .then(|| format!("{name} begins {:.2} mm deep in {other}, and will be pushed out", depth_m * 1e3))
     }
 

@@ -46,20 +46,20 @@ pub(super) fn all(rig: &Rig, entities: &[Entity], pairs: &[Pair]) -> Option<Stri
             .map(|by_velocity| by_velocity * dt_s * (one + both))
     };
     let grows = |[c, d]: [f64; 2]| growth(integrator, c, d) > GROWS;
+    let mut touched: Vec<Vec<usize>> = vec![Vec::new(); entities.len()];
+    for pair in pairs {
+        touched[pair.one].push(pair.other);
+        touched[pair.other].push(pair.one);
+    }
+    let alike = alike(entities, gives_per_kg);
     let on_others = |index: usize| {
-        let entity = &entities[index];
-        let others = (0..entities.len()).filter(|&other| other != index);
-        let mut others =
-            others.filter(|&other| entities[other].is_collidable && entities[other].space == entity.space);
-        let touched = pairs.iter().filter(|pair| pair.touches());
-        let touched = touched.filter_map(|pair| match index {
-            _ if index == pair.one => Some(pair.other),
-            _ if index == pair.other => Some(pair.one),
-            _ => None,
-        });
-        let of_all =
-            touched.map(|other| shares(index, other)).fold([0.0; 2], |[c, d], one| [c + one[0], d + one[1]]);
-        grows(of_all) || others.any(|other| grows(shares(index, other)))
+        let of_all = touched[index].iter().map(|&other| shares(index, other));
+        let of_all = of_all.fold([0.0; 2], |[c, d], one| [c + one[0], d + one[1]]);
+        // Of others that are alike one tells for all.
+        let mut others = alike.iter().filter(|group| entities[group[0]].space == entities[index].space);
+        let other_than = |group: &Vec<usize>| group.iter().copied().find(|&other| other != index);
+        grows(of_all)
+            || others.any(|group| other_than(group).is_some_and(|other| grows(shares(index, other))))
     };
     let is_thrown = |index: &usize| on_fingers(*index) || entities[*index].is_collidable && on_others(*index);
     let thrown = gives.keys().filter(|index| is_thrown(index));
@@ -73,6 +73,23 @@ pub(super) fn all(rig: &Rig, entities: &[Entity], pairs: &[Pair]) -> Option<Stri
             dt_s.recip()
         )
     })
+}
+
+/// Entities that contacts are made with, in groups within which these are the same; two of each group are enough.
+fn alike(entities: &[Entity], gives_per_kg: impl Fn(usize) -> f64) -> Vec<Vec<usize>> {
+    let mut groups: BTreeMap<_, Vec<usize>> = BTreeMap::new();
+    for (index, entity) in entities.iter().enumerate().filter(|(_, entity)| entity.is_collidable) {
+        let stiffness =
+            (entity.stiffness_n_per_m.to_bits(), entity.contact_stiffness_n_per_m.map(f64::to_bits));
+        let gives = (gives_per_kg(index).to_bits(), points(entity).to_bits());
+        let key =
+            (entity.space, entity.is_stiffness_said, stiffness, entity.damping_n_s_per_m.to_bits(), gives);
+        let group = groups.entry(key).or_default();
+        if group.len() < 2 {
+            group.push(index);
+        }
+    }
+    groups.into_values().collect()
 }
 
 /// The most that a body gives way to springs at all its points on something flat, by the stiffness of one (1/kg): as it hops,

@@ -16,11 +16,12 @@ use world::{MassSpec, Scene, SceneEntity, ShapeSpec};
 
 /// All of them.
 pub(super) fn all(rig: &Rig, measures: &[Measures]) -> Vec<String> {
-    let mut found: Vec<String> = measures.iter().filter_map(|it| length(rig, it)).collect();
+    let measured = || rig.scene.entities.iter().zip(measures);
+    let mut found: Vec<String> = measured().filter_map(|(spec, it)| length(spec, it)).collect();
     found.extend(measures.iter().filter_map(not_drawn));
     found.extend(measures.iter().filter_map(mass));
-    found.extend(measures.iter().flat_map(|it| turning(rig, it)));
-    found.extend(measures.iter().filter_map(|it| spread(rig, it)));
+    found.extend(measured().flat_map(|(spec, it)| turning(spec, it)));
+    found.extend(measured().filter_map(|(spec, it)| spread(spec, it)));
     found.extend(densities(&rig.scene));
     found.extend(far(rig, measures));
     found.extend(fingers(&rig.scene));
@@ -42,16 +43,18 @@ pub(super) fn of_the_hand(rig: &Rig) -> Vec<String> {
 /// Of each thing, whether one of them is about its size, its mass or its place.
 pub(super) fn suspected(rig: &Rig, measures: &[Measures]) -> Vec<bool> {
     let boxes = reached(rig);
-    let is_suspected = |it: &Measures| length(rig, it).is_some() || mass(it).is_some() || is_far(it, &boxes);
-    measures.iter().map(is_suspected).collect()
+    let is_suspected = |(spec, it): (&SceneEntity, &Measures)| {
+        length(spec, it).is_some() || mass(it).is_some() || is_far(it, &boxes)
+    };
+    rig.scene.entities.iter().zip(measures).map(is_suspected).collect()
 }
 
-fn length(rig: &Rig, it: &Measures) -> Option<String> {
+fn length(spec: &SceneEntity, it: &Measures) -> Option<String> {
     let (name, length_m) = (&it.name, it.length_m()?);
     if length_m >= HOUSE_M && !it.is_around {
-        let instead = match file_of(rig, name) {
+        let instead = match file_of(spec) {
             Some(file) => format!("its file {file} may be in millimetres: give the shape `scale = 0.001`"),
-            None => match keys_in_millimetres(&spec_of(rig, name)?.shape) {
+            None => match keys_in_millimetres(&spec.shape) {
                 Some(keys) => format!("lengths are in metres: if millimetres were meant, write {keys}"),
                 None => "lengths are in metres".to_owned(),
             },
@@ -73,10 +76,6 @@ fn not_drawn(it: &Measures) -> Option<String> {
             format!("of {name} nothing is drawn, for nothing is left or all of it is too thin; {why}")
         }
     })
-}
-
-fn spec_of<'r>(rig: &'r Rig, name: &str) -> Option<&'r SceneEntity> {
-    rig.scene.entities.iter().find(|entity| entity.name == *name)
 }
 
 /// The keys that give a shape its size, with the values that they have if millimetres were meant.
@@ -105,8 +104,8 @@ fn keys_in_millimetres(shape: &ShapeSpec) -> Option<String> {
     })
 }
 
-fn file_of(rig: &Rig, name: &str) -> Option<String> {
-    match &spec_of(rig, name)?.shape {
+fn file_of(spec: &SceneEntity) -> Option<String> {
+    match &spec.shape {
         ShapeSpec::Mesh(model) | ShapeSpec::Nurbs(model) => Some(model.file.display().to_string()),
         _ => None,
     }
@@ -128,11 +127,11 @@ fn mass(it: &Measures) -> Option<String> {
 }
 
 /// Resistance to rolling and spinning as a number, as it stands in tables: it is a length.
-fn turning(rig: &Rig, it: &Measures) -> Vec<String> {
-    let Some((entity, length_m)) = spec_of(rig, &it.name).zip(it.length_m()) else { return Vec::new() };
+fn turning(spec: &SceneEntity, it: &Measures) -> Vec<String> {
+    let Some(length_m) = it.length_m() else { return Vec::new() };
     let lengths = [
-        ("rolling_friction_m", entity.rolling_friction_m),
-        ("torsional_friction_m", entity.torsional_friction_m),
+        ("rolling_friction_m", spec.rolling_friction_m),
+        ("torsional_friction_m", spec.torsional_friction_m),
     ];
     let beyond = lengths.into_iter().filter(|(_, value_m)| *value_m > 0.5 * length_m);
     let told = beyond.map(|(key, value_m)| {
@@ -148,26 +147,25 @@ fn turning(rig: &Rig, it: &Measures) -> Vec<String> {
 }
 
 /// A centre of mass that is not in the box around it, and moments that no mass in that box has.
-fn spread(rig: &Rig, it: &Measures) -> Option<String> {
-    spec_of(rig, &it.name).and_then(|entity| {
-        let (motion, size_m, mass_kg) = (entity.motion?, Vector3::from(it.size_m?), it.mass_kg?);
-        let middle_B = entity.pose.inverse_transform_point(&it.middle_m.into()).coords;
-        let centre_B = motion.centre_of_mass_m.map_or(middle_B, Vector3::from);
-        let from_middle_m = (centre_B - middle_B).abs();
-        let outside_m = (from_middle_m - size_m * 0.5).max();
-        if outside_m > 1e-6 * size_m.max() {
-            return Some(format!(
-                "{}: its centre of mass is {} m outside of it; centre_of_mass_m is in metres, in the frame of the entity",
-                it.name,
-                short(outside_m)
-            ));
-        }
-        // All of it in the corner that is farthest away.
-        let squares_m2 = (from_middle_m + size_m * 0.5).map(|part_m| part_m * part_m);
-        let axis = |axis: usize| {
-            let most = mass_kg * (squares_m2.sum() - squares_m2[axis]);
-            let moment = motion.inertia_kg_m2?[axis];
-            (moment > most).then(|| {
+fn spread(spec: &SceneEntity, it: &Measures) -> Option<String> {
+    let (motion, size_m, mass_kg) = (spec.motion?, Vector3::from(it.size_m?), it.mass_kg?);
+    let middle_B = spec.pose.inverse_transform_point(&it.middle_m.into()).coords;
+    let centre_B = motion.centre_of_mass_m.map_or(middle_B, Vector3::from);
+    let from_middle_m = (centre_B - middle_B).abs();
+    let outside_m = (from_middle_m - size_m * 0.5).max();
+    if outside_m > 1e-6 * size_m.max() {
+        return Some(format!(
+            "{}: its centre of mass is {} m outside of it; centre_of_mass_m is in metres, in the frame of the entity",
+            it.name,
+            short(outside_m)
+        ));
+    }
+    // All of it in the corner that is farthest away.
+    let squares_m2 = (from_middle_m + size_m * 0.5).map(|part_m| part_m * part_m);
+    let axis = |axis: usize| {
+        let most = mass_kg * (squares_m2.sum() - squares_m2[axis]);
+        let moment = motion.inertia_kg_m2?[axis];
+        (moment > most).then(|| {
                 format!(
                     "{}: inertia_kg_m2 about {} is {}, more than {}, which is all of its mass at its farthest corner; if \
                      kg mm^2 were meant, write {}",
@@ -178,9 +176,8 @@ fn spread(rig: &Rig, it: &Measures) -> Option<String> {
                     short(1e-6 * moment)
                 )
             })
-        };
-        (0..3).find_map(axis)
-    })
+    };
+    (0..3).find_map(axis)
 }
 
 /// Densities in grams per cubic centimetre.

@@ -217,9 +217,12 @@ impl<'a> World<'a> {
     }
 
     fn touched(&self, (near, space): (&[u32], u32), radius_m: f64, place_W: &Vector3<f64>) -> Touched {
-        let Ok(probe) = Finger::new(radius_m, near.len()) else { return Touched::default() };
+        let within =
+            near.iter().copied().filter(|&at| may_touch(&self.entities[at as usize], radius_m, place_W));
+        let within: Vec<u32> = within.collect();
+        let Ok(probe) = Finger::new(radius_m, within.len()) else { return Touched::default() };
         let mut probe = probe.within(space);
-        probe.step_near(self.entities, near, Hip { position_W: *place_W, velocity_W: None }, 1e-3);
+        probe.step_near(self.entities, &within, Hip { position_W: *place_W, velocity_W: None }, 1e-3);
         let contacts = probe.contacts().map(|contact| {
             let along: Matrix3<f64> = contact.normal_W * contact.normal_W.transpose();
             let material = self.entities[contact.entity].felt_material(contact.label);
@@ -290,6 +293,18 @@ fn once(mut places: Vec<Vector3<f64>>) -> Vec<Vector3<f64>> {
     places.sort_by(|a, b| a.x.total_cmp(&b.x).then(a.y.total_cmp(&b.y)).then(a.z.total_cmp(&b.z)));
     places.dedup_by(|a, b| (*a - *b).amax() < SAME_M);
     places
+}
+
+/// False where a finger of this radius is farther from a closed form than it reaches (m).
+fn may_touch(entity: &Entity, radius_m: f64, place_W: &Vector3<f64>) -> bool {
+    if !matches!(entity.shape, Shape::Form(_)) {
+        return true;
+    }
+    let raised_m = entity.height_map.as_ref().map_or(0.0, |heights| heights.range_m()[1].abs());
+    bounding_ball(&entity.shape).is_none_or(|(c, r)| {
+        let reach_m = r + radius_m + raised_m + BELOW_M;
+        (entity.X_WB.transform_point(&c.into()).coords - place_W).norm_squared() <= reach_m * reach_m
+    })
 }
 
 /// Gains of contacts along the stiffest axis, and the loop's limits there.
