@@ -38,7 +38,7 @@ use haptics::{Door, Effects, Entity, Field, FingerEffects, Guide, Hip, Moment, P
 use last_line::{LastLine, Line};
 use nalgebra::Vector3;
 use near::Near;
-use physics::{Body, BodyError, Manipulation, Room, Wanted};
+use physics::{Begins, Body, BodyError, Manipulation, Room, Wanted};
 use shm_abi::MAX_DEVICES;
 use shm_abi::frame::DEVICE_POSITION_VALID;
 use shm_abi::{Command, Frame};
@@ -139,11 +139,14 @@ impl FastStep {
         hand: &[HandFinger],
         wants_quality: bool,
     ) -> Result<Self, BodyError> {
+        let broad_phase = self.objects.manipulation.broad_phase();
         self.objects = if bodies.len() <= lists.fast_bodies {
-            let manipulation = Manipulation::new(&self.entities, bodies, settings)?;
+            let begins = Begins { broad_phase: Some(broad_phase), ..Begins::default() };
+            let manipulation = Manipulation::begin(&self.entities, bodies, settings, begins)?;
             Objects::new(manipulation, hand, wants_quality, self.period_s)
         } else {
-            let Lists { fast, hand_over, slow } = Lists::new(&self.entities, bodies, settings, lists)?;
+            let Lists { fast, hand_over, slow } =
+                Lists::among(&self.entities, bodies, settings, lists, broad_phase)?;
             Objects::new(fast, hand, wants_quality, self.period_s).with_lists(hand_over, slow)
         };
         Ok(self)
@@ -217,6 +220,12 @@ impl FastStep {
     /// Number of times that contacts between entities had no room so far, in the fast list.
     pub fn left_out(&self) -> u64 {
         self.objects.left_out()
+    }
+
+    /// Number of pairs of entities near each other in the fast list, and how many have room.
+    pub fn pairs(&self) -> [usize; 2] {
+        let manipulation = &self.objects.manipulation;
+        [manipulation.pair_count(), manipulation.pair_room()]
     }
 
     /// What was cut from forces in the last tick, because nothing moved for it.

@@ -125,7 +125,7 @@ fn timed(a: &Form, b: &Form, seed: u64, clock_ns: f64) -> (Vec<f64>, usize) {
     let (shape_a, shape_b) = (Shape::Form(*a), Shape::Form(*b));
     let (mut best, mut count) = (vec![f64::INFINITY; POSES], 0);
     for _ in 0..RUNS {
-        let mut memory = start;
+        let mut memory = start.clone();
         count = 0;
         for (step, best) in best.iter_mut().enumerate() {
             let part = step as f64 / POSES as f64;

@@ -55,6 +55,7 @@ mod mesh_span;
 mod mesh_spread;
 mod mesh_springs;
 mod overlay;
+mod places;
 mod rim;
 mod ring;
 mod ring_deep;
@@ -64,6 +65,7 @@ pub use bounds::bounding_ball;
 pub(crate) use mesh_patch::Searched;
 pub use mesh_patch::{Patch, Patches};
 pub(crate) use mesh_spread::Spread;
+pub use places::Places;
 use spots::{Spot, Spots};
 
 /// The most contact points of two entities.
@@ -142,12 +144,12 @@ pub struct Solid<'s> {
 }
 
 /// What finding the contact points of a pair remembers from tick to tick.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[derive(Debug, Clone, PartialEq, Default)]
 pub struct PairMemory {
     /// Whatever the pair's algorithm makes of them.
     pub words: [f64; 8],
     /// Of a mesh, where it touches.
-    pub patches: Patches,
+    pub patches: Places,
     /// Points are so soft that energy in them can be felt: of a mesh all vertices count.
     pub is_soft: bool,
     /// B never moves: vertices of a fixed mesh do not count where a closed form touches it.

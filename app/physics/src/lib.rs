@@ -66,7 +66,9 @@ pub use grasp_axis::GraspAxis;
 pub use hand::{FingerSettings, FingerTick};
 pub use integrator::Integrator;
 pub use limit_surface::LimitSurface;
-pub use manipulation::{MAX_DRIVEN, Made, Manipulation, PairStanding, Parcel, Parked, Reason, Room, Wanted};
+pub use manipulation::{
+    Begins, MAX_DRIVEN, Made, Manipulation, PairStanding, Parcel, Parked, Reason, Room, Wanted,
+};
 pub use mass::MassProperties;
 pub use pair::{Response, Surfacing};
 pub use pair_friction::PairFriction;

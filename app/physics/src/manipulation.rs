@@ -38,7 +38,7 @@ use crate::contacts::Contacts;
 use crate::error::BodyError;
 use crate::hand::{FingerSettings, FingerTick, Hand};
 use crate::integrator::Gets;
-use crate::pairs::{Key, Pairs, Who};
+use crate::pairs::{self, Key, Pairs, Who};
 use crate::pull::{MAX_PULLS, Pull};
 use crate::roster::Roster;
 use crate::settings::Settings;
@@ -106,6 +106,24 @@ pub struct Manipulation {
     has_changed: Box<[bool]>,
 }
 
+/// How a manipulation begins.
+#[derive(Debug, Clone, Copy)]
+pub struct Begins<'b> {
+    /// It steps the bodies; else somebody else does, all of them.
+    pub are_here: bool,
+    /// Its ticks allocate nothing. Where they may, room for pairs is made when it is needed: none is left out, and there is
+    /// little more than is used.
+    pub has_deadlines: bool,
+    /// What is known already of where the entities are.
+    pub broad_phase: Option<&'b BroadPhase>,
+}
+
+impl Default for Begins<'_> {
+    fn default() -> Self {
+        Self { are_here: true, has_deadlines: true, broad_phase: None }
+    }
+}
+
 /// The most touches of fingers in a tick.
 const MAX_TOUCHES: usize = 64;
 /// Contact points between entities that have room at first, or so many of each body if that is more; until there is
@@ -124,7 +142,21 @@ impl Manipulation {
     /// A body whose contact points nobody can find.
     pub fn new(entities: &[Entity], bodies: &[(usize, Body)], settings: Settings) -> Result<Self, BodyError> {
         check(entities, bodies)?;
-        Ok(Self::of(entities, bodies, settings, true))
+        Self::begin(entities, bodies, settings, Begins::default())
+    }
+
+    /// The same, as it is said how it begins.
+    ///
+    /// # Errors
+    /// As of [`Self::new`].
+    pub fn begin(
+        entities: &[Entity],
+        bodies: &[(usize, Body)],
+        settings: Settings,
+        begins: Begins<'_>,
+    ) -> Result<Self, BodyError> {
+        check(entities, bodies)?;
+        Ok(Self::of(entities, bodies, settings, begins))
     }
 
     /// The same of bodies that somebody else steps, all of them.
@@ -136,16 +168,15 @@ impl Manipulation {
         bodies: &[(usize, Body)],
         settings: Settings,
     ) -> Result<Self, BodyError> {
-        check(entities, bodies)?;
-        Ok(Self::of(entities, bodies, settings, false))
+        Self::begin(entities, bodies, settings, Begins { are_here: false, ..Begins::default() })
     }
 
     /// Nothing moves; where the entities are is known all the same.
     pub fn of_none(entities: &[Entity]) -> Self {
-        Self::of(entities, &[], Settings::default(), true)
+        Self::of(entities, &[], Settings::default(), Begins::default())
     }
 
-    fn of(entities: &[Entity], bodies: &[(usize, Body)], settings: Settings, are_here: bool) -> Self {
+    fn of(entities: &[Entity], bodies: &[(usize, Body)], settings: Settings, begins: Begins<'_>) -> Self {
         // Contacts ask for them of each body, and of what is convex.
         let movable = bodies.iter().map(|(entity, _)| (&entities[*entity], true));
         let touched = entities.iter().filter(|_| !bodies.is_empty()).map(|entity| (entity, false));
@@ -160,11 +191,17 @@ impl Manipulation {
         let places = count + MAX_DRIVEN;
         let most_pairs = count.saturating_mul(entities.len());
         // Of those elsewhere few come here at once; more room is made when they do.
+        let Begins { are_here, has_deadlines, broad_phase } = begins;
         let here = if are_here { count } else { 0 };
-        let pairs = most_pairs.min(PAIRS.max(PAIRS_OF_BODY * here));
-        let pairs = Pairs::with_capacity(pairs, most_pairs);
+        let at_first = most_pairs.min(PAIRS.max(PAIRS_OF_BODY * here));
+        let pairs = if has_deadlines {
+            Pairs::with_capacity(at_first, most_pairs)
+        } else {
+            Pairs::growing(most_pairs)
+        };
         let rows = RowCounts {
-            of_pairs: (pairs.room() * MAX_POINTS).min(ROWS.max(ROWS_OF_BODY * here)),
+            of_pairs: (at_first.next_multiple_of(pairs::CHUNK) * MAX_POINTS)
+                .min(ROWS.max(ROWS_OF_BODY * here)),
             of_fingers: MAX_TOUCHES + MAX_PULLS,
             bodies: count,
         };
@@ -173,7 +210,7 @@ impl Manipulation {
             settings,
             contacts: settings.contacts(heaviest_kg),
             roster: Roster::new(entities.len(), bodies),
-            broad_phase: BroadPhase::new(entities),
+            broad_phase: broad_phase.cloned().unwrap_or_else(|| BroadPhase::new(entities)),
             bodies: Vec::with_capacity(places),
             entities: Vec::with_capacity(places),
             room: Box::new(RowRoom::new(rows)),

@@ -16,7 +16,8 @@ use crate::anchor::Anchor;
 use crate::body::Body;
 use crate::broad_phase::Aabb;
 use crate::collide::{
-    ContactPoint, ContactPoints, MAX_POINTS, PairMemory, Solid, bounding_ball, contact_points,
+    ContactPoint, ContactPoints, MAX_POINTS, PairMemory, Patches, Places, Solid, bounding_ball,
+    contact_points,
 };
 use crate::pairs::Who;
 use crate::restitution::{Meeting, Stop, spin_W, velocity};
@@ -30,7 +31,7 @@ pub(crate) use pressed::{LET_OUT_M_S, let_out_m_s};
 pub use surfacing::{Response, Surfacing};
 
 /// A pair and its contact points.
-#[derive(Debug, Clone, Default)]
+#[derive(Debug, Clone)]
 pub(crate) struct Pair {
     /// Of the entities: A's, which is a body, and B's.
     pub(crate) entities: [usize; 2],
@@ -42,8 +43,9 @@ pub(crate) struct Pair {
     remembers: bool,
     /// One of them is a mesh: only then its places are looked at.
     has_mesh: bool,
-    /// Those beyond the count are whatever was there.
-    anchors: [Anchor; MAX_POINTS],
+    /// Those beyond the count are whatever was there. There is room for all, or of who has no deadlines for as many as there
+    /// were so far.
+    anchors: Box<[Anchor]>,
     count: usize,
     /// Nobody has looked yet whether it touches.
     is_new: bool,
@@ -93,6 +95,44 @@ pub(crate) struct End<'t> {
 }
 
 impl Pair {
+    /// Room for all that a pair may have.
+    pub(crate) fn with_room() -> Self {
+        Self::of(vec![Anchor::default(); MAX_POINTS], PairMemory::default())
+    }
+
+    /// Room for what most pairs have; more is allocated when it is needed.
+    pub(crate) fn with_little_room() -> Self {
+        let memory = PairMemory { patches: Places::later(), ..PairMemory::default() };
+        Self::of(vec![Anchor::default(); FEW_POINTS], memory)
+    }
+
+    fn of(anchors: Vec<Anchor>, memory: PairMemory) -> Self {
+        Self {
+            entities: [0; 2],
+            bodies: (0, None),
+            surfacing: Surfacing::default(),
+            memory,
+            remembers: false,
+            has_mesh: false,
+            anchors: anchors.into(),
+            count: 0,
+            is_new: false,
+            ledger: Ledger::default(),
+            first_row: 0,
+            rows: 0,
+        }
+    }
+
+    /// Room for so many points, of who has [little](Self::with_little_room).
+    fn make_room(&mut self, points: usize) {
+        if points > self.anchors.len() {
+            let mut more =
+                vec![Anchor::default(); if points > SOME_POINTS { MAX_POINTS } else { SOME_POINTS }];
+            more[..self.anchors.len()].copy_from_slice(&self.anchors);
+            self.anchors = more.into();
+        }
+    }
+
     /// Begins one that has not touched yet, in the place of one that has ended. What nobody reads of that stays. What they hold
     /// where they are is theirs if somebody has put one of them there.
     pub(crate) fn begin(
@@ -112,7 +152,7 @@ impl Pair {
         self.ledger = Ledger::default();
         self.memory.words = Default::default();
         if has_mesh {
-            self.memory.patches = Default::default();
+            *self.memory.patches = Patches::default();
         }
     }
 
@@ -307,7 +347,7 @@ impl Pair {
         if std::mem::take(&mut self.remembers) {
             self.memory.words = Default::default();
             if self.has_mesh {
-                self.memory.patches = Default::default();
+                *self.memory.patches = Patches::default();
             }
         }
     }
@@ -403,6 +443,7 @@ impl Pair {
         is_free.iter_mut().take(self.count).for_each(|free| *free = true);
         let begins = self.count == 0;
         self.count = found.as_slice().len();
+        self.make_room(self.count);
         let mut is_new = [false; MAX_POINTS];
         for (at, point) in found.as_slice().iter().enumerate() {
             let same = (0..was.len()).find(|&old| is_free[old] && was[old].id == point.id);
@@ -492,6 +533,10 @@ const SQUEEZED_M_S: f64 = 1.0;
 const CARRIED: f64 = 1.02;
 /// Sine of a way along a face that comes no nearer.
 const ALONG: f64 = 1e-3;
+/// Contact points of a pair that has little room: a face at rest has so many, and two forms no more than twice that, but for
+/// rings.
+const FEW_POINTS: usize = 4;
+const SOME_POINTS: usize = 8;
 /// Contact points are looked for from this distance on \[m\].
 pub(crate) const REACH_M: f64 = 1e-3;
 /// A contact point of another name within this distance is the same one \[m\].

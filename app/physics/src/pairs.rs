@@ -5,13 +5,15 @@
 //! at them until one is woken.
 //! Invariants: of two bodies there is one pair, whose first is the one of the lower number; pairs are gone through in
 //! ascending order; no allocation after `with_capacity`. Where there is no room for one more it is left out, counted,
-//! and begun when [there is more](Pairs::take).
+//! and begun when [there is more](Pairs::take). Who has no deadlines makes room when it is needed ([`Pairs::growing`]), and
+//! leaves none out.
 //! What has ended is not cleared: who begins in its place overwrites what is read.
 
 mod pool;
 
 use haptics::{Entity, Shape};
 
+pub(crate) use pool::CHUNK;
 use pool::{Chunk, Pool};
 
 use crate::broad_phase::BroadPhase;
@@ -37,6 +39,8 @@ pub(crate) struct Pairs {
     lacks_some: bool,
     /// There are no more of them in the world.
     most: usize,
+    /// Room is made when it is needed, whoever waits for that.
+    grows: bool,
 }
 
 /// Room for more pairs than there were.
@@ -103,8 +107,25 @@ impl Pairs {
             missing: 0,
             lacks_some: false,
             most: most.min(pool::MOST),
+            grows: false,
             pool,
         }
+    }
+
+    /// Without room, of which more is made whenever it is needed: for who has no deadlines. None is left out then.
+    pub(crate) fn growing(most: usize) -> Self {
+        Self { grows: true, ..Self::with_capacity(0, most) }
+    }
+
+    /// A place for one more; of those that grow there is one.
+    fn place(&mut self, is_full: bool) -> Option<u32> {
+        if self.grows && self.unused.is_empty() {
+            let begin = self.pool.len() as u32;
+            if self.pool.grow() {
+                self.unused.extend((begin..self.pool.len() as u32).rev());
+            }
+        }
+        self.unused.pop_if(|_| self.grows || !is_full)
     }
 
     /// Number that has room.
@@ -114,9 +135,12 @@ impl Pairs {
 
     /// Number that should have room, if that is more than has: twice as many as are used.
     pub(crate) fn wanted(&self) -> Option<usize> {
+        if self.grows {
+            return None;
+        }
         let room = self.pool.len();
         let used = room - self.unused.len() + (self.missing as usize).min(room);
-        let wanted = (2 * used).max(room + room / 2).min(self.most).next_multiple_of(pool::CHUNK);
+        let wanted = (2 * used).max(room + room / 2).min(self.most).next_multiple_of(CHUNK);
         (wanted > room && 8 * used > 5 * room).then_some(wanted)
     }
 
@@ -279,7 +303,7 @@ impl Pairs {
             return None;
         }
         let is_full = other.is_some() && self.unused.len() <= self.pool.len() / 4;
-        let Some(place) = self.unused.pop_if(|_| !is_full) else {
+        let Some(place) = self.place(is_full) else {
             self.missing += 1;
             self.lacks_some = true;
             return None;
@@ -336,7 +360,7 @@ impl Pairs {
 
     /// Begins a pair as it was elsewhere, in none of the lists: `None` where there is no room.
     pub(crate) fn begin_as(&mut self, head: &Head) -> Option<u32> {
-        let Some(place) = self.unused.pop() else {
+        let Some(place) = self.place(false) else {
             self.missing += 1;
             return None;
         };

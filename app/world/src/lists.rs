@@ -30,7 +30,7 @@ pub use slow::SlowList;
 pub use waits::Waits;
 
 use haptics::Entity;
-use physics::{Body, BodyError, Manipulation, Settings};
+use physics::{Begins, Body, BodyError, BroadPhase, Manipulation, Settings};
 
 /// When islands change lists.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -73,12 +73,27 @@ impl Lists {
         settings: Settings,
         lists: ListSettings,
     ) -> Result<Self, BodyError> {
+        Self::among(entities, bodies, settings, lists, &BroadPhase::new(entities))
+    }
+
+    /// The same, of entities of which it is known where they are.
+    ///
+    /// # Errors
+    /// As of [`Manipulation::new`].
+    pub fn among(
+        entities: &[Entity],
+        bodies: &[(usize, Body)],
+        settings: Settings,
+        lists: ListSettings,
+        broad_phase: &BroadPhase,
+    ) -> Result<Self, BodyError> {
         let all_slow = bodies.len() > lists.fast_bodies;
-        let manipulation = |are_here: bool| {
-            let make = if are_here { Manipulation::new } else { Manipulation::of_those_elsewhere };
-            make(entities, bodies, settings)
+        let begins = |are_here: bool, has_deadlines: bool| {
+            let begins = Begins { are_here, has_deadlines, broad_phase: Some(broad_phase) };
+            Manipulation::begin(entities, bodies, settings, begins)
         };
-        let (fast, slow) = (manipulation(!all_slow)?, manipulation(all_slow)?.without_those_elsewhere());
+        let fast = begins(!all_slow, true)?;
+        let slow = begins(all_slow, false)?.without_those_elsewhere();
         let (fast_end, slow_end) = link::link(bodies.len());
         Ok(Self {
             fast,

@@ -32,7 +32,7 @@ pub(super) fn contact_points(
         let mut of_places = Told { X_WM, mesh_is_a, part: 1.0 - part, found: told.found };
         mesh_solid::contact_points(mesh, other, reach_m, memory, &mut of_places);
     } else if memory.patches.all[0].is_known {
-        memory.patches = Patches::default();
+        *memory.patches = Patches::default();
     }
     let is_lost = is_sheet && !told.found.as_slice().iter().any(|point| point.gap_m < 0.0);
     let part = if is_lost { ring.part(deepest_m(mesh, &ring)) } else { part };

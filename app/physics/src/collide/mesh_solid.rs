@@ -49,7 +49,7 @@ pub(super) fn contact_points(
 ) {
     let travel_m = (reach_m - crate::pair::REACH_M).max(0.0);
     let touch = Touch::of(mesh, other, &mut memory.words);
-    let patches = &mut memory.patches;
+    let patches: &mut Patches = &mut memory.patches;
     let do_meet = match &touch {
         Some(touch) => touch.gap_m <= reach_m,
         None => meet(mesh, other, reach_m, patches),

@@ -39,6 +39,16 @@ impl Manipulation {
         self.pairs.left_out
     }
 
+    /// Number of pairs of entities that are near each other.
+    pub fn pair_count(&self) -> usize {
+        self.pairs.key_count()
+    }
+
+    /// Number of pairs that have room.
+    pub fn pair_room(&self) -> usize {
+        self.pairs.room()
+    }
+
     /// Somebody has taken note of all changes.
     pub fn forget_changes(&mut self) {
         for body in self.changed.drain(..) {

@@ -45,6 +45,7 @@ impl Pair {
         self.begin(head.entities.map(|entity| entity as usize), head.has_mesh, head.surfacing, head.is_new);
         (self.ledger, self.remembers) = (head.ledger, head.remembers);
         self.count = (head.count as usize).min(MAX_POINTS);
+        self.make_room(self.count);
         self.memory.words = head.words;
         if head.has_mesh {
             self.memory.patches.go_on_from(head.searched);

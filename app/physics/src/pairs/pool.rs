@@ -7,7 +7,7 @@ use crate::pair::Pair;
 /// The most chunks: two million pairs.
 const MAX_CHUNKS: usize = 16_384;
 /// Pairs of a chunk.
-pub(super) const CHUNK: usize = 128;
+pub(crate) const CHUNK: usize = 128;
 /// The most pairs.
 pub(super) const MOST: usize = MAX_CHUNKS * CHUNK;
 
@@ -18,12 +18,20 @@ pub(super) struct Pool {
 }
 
 /// Room for [`CHUNK`] pairs.
-pub(super) type Chunk = Box<[Pair; CHUNK]>;
+pub(super) type Chunk = Box<[Pair]>;
 
 /// Chunks for so many pairs.
 pub(super) fn chunks(pairs: usize) -> Vec<Chunk> {
-    let chunk = || vec![Pair::default(); CHUNK].into_boxed_slice().try_into();
-    (0..pairs.div_ceil(CHUNK)).filter_map(|_| chunk().ok()).collect()
+    (0..pairs.div_ceil(CHUNK)).map(|_| chunk(Pair::with_room)).collect()
+}
+
+/// Chunk of who has no deadlines.
+pub(super) fn small_chunk() -> Chunk {
+    chunk(Pair::with_little_room)
+}
+
+fn chunk(pair: impl Fn() -> Pair) -> Chunk {
+    (0..CHUNK).map(|_| pair()).collect()
 }
 
 impl Pool {
@@ -36,6 +44,15 @@ impl Pool {
     /// Number of pairs that have room.
     pub(super) fn len(&self) -> usize {
         self.chunks.len() * CHUNK
+    }
+
+    /// Takes one more chunk, if there may be one. For who has no deadlines.
+    pub(super) fn grow(&mut self) -> bool {
+        let may = self.chunks.len() < MAX_CHUNKS;
+        if may {
+            self.chunks.push(small_chunk());
+        }
+        may
     }
 
     /// Takes these chunks, but for what is too much.

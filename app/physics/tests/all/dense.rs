@@ -6,7 +6,7 @@ use crate::common;
 use common::*;
 use haptics::{Cuboid, Entity, Sphere};
 use nalgebra::{Isometry3, Vector3};
-use physics::{Body, ContactStiffness, Settings};
+use physics::{Begins, Body, ContactStiffness, Manipulation, Settings};
 
 /// Things of one size in rows, so far apart, on a floor; the lowest are the last.
 fn block(counts: [usize; 3], size: [f64; 3], apart: f64) -> World {
@@ -90,10 +90,8 @@ fn a_heap_has_the_room_that_it_needs() {
     assert!(nearest > 0.0198, "{nearest} m");
 }
 
-/// Things that met while there was no room for them are in each other when there is: nobody has put them there, and they gain
-/// nothing by it.
-#[test]
-fn nothing_is_gained_by_room_that_comes_late() {
+/// Balls in rows without gravity, which all come to one place.
+fn collapse() -> (World, Settings) {
     let mut entities: Vec<Entity> = Vec::new();
     for at in 0..1000 {
         let [x, y, z] = [at % 10, at / 10 % 10, at / 100].map(|place| f64::from(place) * 0.035 - 0.1575);
@@ -106,8 +104,37 @@ fn nothing_is_gained_by_room_that_comes_late() {
     let bodies: Vec<(usize, Body)> = (0..entities.len()).map(|at| (at, moving(at))).collect();
     let contact_stiffness = ContactStiffness::ByMass { damping_ratio: 1.0 };
     let gravity_W = Vector3::zeros();
-    let mut world =
-        World::new(entities, &bodies, Settings { contact_stiffness, gravity_W, ..Settings::default() }, 0);
+    let settings = Settings { contact_stiffness, gravity_W, ..Settings::default() };
+    (World::new(entities, &bodies, settings, 0), settings)
+}
+
+/// Room that is made in the middle of a tick, instead of before it, changes nothing, and there is none to spare.
+#[test]
+fn without_deadlines_no_pair_is_left_out_and_things_move_as_with_room_for_all() {
+    let ((mut world, _), (mut growing, settings)) = (collapse(), collapse());
+    let bodies: Vec<_> = growing.manipulation.bodies().iter().copied().enumerate().collect();
+    let begins = Begins { has_deadlines: false, ..Begins::default() };
+    growing.manipulation = Manipulation::begin(&growing.entities, &bodies, settings, begins).unwrap();
+    growing.makes_room = false;
+    let mut most_pairs = 0;
+    for tick in 0..40 {
+        for world in [&mut world, &mut growing] {
+            world.step(&[]);
+        }
+        assert!(world.manipulation.bodies() == growing.manipulation.bodies(), "tick {tick}");
+        most_pairs = most_pairs.max(growing.manipulation.pair_count());
+    }
+    assert_eq!([&world, &growing].map(|world| world.manipulation.left_out()), [0; 2]);
+    assert!(most_pairs > 6000, "{most_pairs}: more than have room at first");
+    let room = growing.manipulation.pair_room();
+    assert!((most_pairs..most_pairs + 256).contains(&room), "{room} for {most_pairs}");
+}
+
+/// Things that met while there was no room for them are in each other when there is: nobody has put them there, and they gain
+/// nothing by it.
+#[test]
+fn nothing_is_gained_by_room_that_comes_late() {
+    let (mut world, _) = collapse();
     let energy_j =
         |world: &World| world.manipulation.bodies().iter().map(Body::kinetic_energy_j).sum::<f64>();
     let (begin_j, mut was_j) = (energy_j(&world), energy_j(&world));

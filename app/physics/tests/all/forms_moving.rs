@@ -66,7 +66,7 @@ fn largest_jump(
     (along, axis): (Vector3<f64>, Vector3<f64>),
     steps: usize,
 ) -> f64 {
-    let mut memory = *memory;
+    let mut memory = memory.clone();
     let mut last: Option<[Vector3<f64>; 2]> = None;
     let mut most = 0.0_f64;
     for step in 0..steps {

@@ -263,7 +263,7 @@ fn go(through: &Through, radii_m: [f64; 2], path: &Path, seen: &mut Seen) {
                 assert!(change_m < most_m, "changes by {change_m}, not {most_m}: {}", told());
             }
         }
-        last = Some((now_m, memory));
+        last = Some((now_m, memory.clone()));
     }
 }
 
