@@ -5,6 +5,7 @@
 //! stands in the way is a *problem*: `run` would refuse the scene, with the first of them. What runs, but hardly as
 //! meant, is a *warning*.
 
+mod capacities;
 mod common_places;
 mod contacts;
 mod explicit;
@@ -26,6 +27,7 @@ use crate::loading::while_reading;
 use crate::outputs;
 use crate::rig::{HandMode, Problems, Rig};
 use crate::settings;
+use capacities::Capacities;
 use clap::Args;
 use io_driver::arguments::shortened;
 use io_driver::config::period_of;
@@ -158,7 +160,7 @@ fn check(args: &CheckArgs, settings: &Settings) -> Checked {
         Rig::examine(&file, scene, layout, hand, HandMode::Kinematic, period_ns, &mut problems)
     });
     checked.problems.extend(problems.all().iter().map(|error| Problem::new(error, error.location())));
-    let Some((rig, step)) = rig.and_then(|rig| rig.fast_step().ok().map(|step| (rig, step))) else {
+    let Some((rig, mut step)) = rig.and_then(|rig| rig.fast_step().ok().map(|step| (rig, step))) else {
         return checked;
     };
     let measures = Measures::all(&rig, step.entities());
@@ -166,7 +168,9 @@ fn check(args: &CheckArgs, settings: &Settings) -> Checked {
     checked.warnings.extend(height_maps::all(&rig, step.entities(), &measures));
     checked.warnings.extend(warnings::all(&rig, &whole, step.entities()));
     let suspected = suspicions::suspected(&rig, &measures);
-    checked.summary = Some(Summary::of(&rig, &whole, step.entities(), measures, suspected));
+    let mut summary = Summary::of(&rig, &whole, step.entities(), measures, suspected);
+    summary.capacities = Capacities::measure(&rig, &mut step);
+    checked.summary = Some(summary);
     checked
 }
 

@@ -17,9 +17,14 @@ pub struct Pace {
 }
 
 impl Pace {
+    /// Time that a tick may take of so much between two (ns).
+    pub const fn most_ns(period_ns: u64) -> u64 {
+        period_ns / SHARE
+    }
+
     /// For ticks that are so far apart (ns).
     pub fn new(period_ns: u64) -> Self {
-        Self { most_ns: period_ns / SHARE, bodies: FIRST, was_over: false, ticks: [0; 2] }
+        Self { most_ns: Self::most_ns(period_ns), bodies: FIRST, was_over: false, ticks: [0; 2] }
     }
 
     /// The most bodies in a tick.

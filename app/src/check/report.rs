@@ -1,6 +1,7 @@
 //! What was found, for people.
 
 use super::Checked;
+use super::capacities::Capacities;
 use super::summary::Summary;
 use rt_core::plain_text::Plain;
 use std::fmt::{Display, Write};
@@ -75,6 +76,7 @@ fn table(text: &mut String, summary: &Summary) {
         "cameras",
         summary.cameras.iter().map(|(name, deg)| format!("{name}: {deg} degrees (for the window)")),
     );
+    rows(text, "capacities", summary.capacities.iter().flat_map(Capacities::lines));
     if let Some([now, most]) = summary.memory {
         row(text, "memory", format_args!("{} MB, at most {} MB while it was loaded", now >> 20, most >> 20));
     }

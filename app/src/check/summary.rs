@@ -1,5 +1,6 @@
 //! What is in a scene.
 
+use super::capacities::Capacities;
 use super::measures::Measures;
 use crate::rig::{Passing, Rig};
 use haptics::Entity;
@@ -33,6 +34,7 @@ pub(super) struct Summary {
     pub(super) passing: Vec<Passing>,
     /// What is in the process's memory now, and the most that was (bytes); `None`: the system does not say.
     pub(super) memory: Option<[u64; 2]>,
+    pub(super) capacities: Option<Capacities>,
 }
 
 impl Summary {
@@ -97,6 +99,7 @@ impl Summary {
             suspected,
             passing: rig.what_passes(entities),
             memory: memory(),
+            capacities: None,
         }
     }
 
@@ -128,6 +131,7 @@ impl Summary {
             "passing": self.passing.iter()
                 .map(|passing| json!({ "names": passing.names, "kind": passing.kind, "through": passing.through }))
                 .collect::<Vec<_>>(),
+            "capacities": self.capacities.as_ref().map(Capacities::to_json),
             "memory_bytes": self.memory.map(|[now, most]| json!({ "now": now, "most": most })),
         })
     }

@@ -873,3 +873,60 @@ fn settings_are_layered_and_say_where_data_is() {
         (Some(2), "phantom3: none.toml: no such file; name an existing TOML file\n")
     );
 }
+
+/// Against runs on the virtual clock: lengths of files, and pairs that can be counted by hand.
+#[test]
+fn check_tells_what_a_scene_takes_as_a_run_takes_it() {
+    // Six cubes on a floor, two of them side by side: of each one pair, and one more.
+    let places = [0.0, 0.045, 0.2, 0.3, 0.4, 0.5];
+    let cubes = places.iter().enumerate().map(|(at, x)| {
+        format!(
+            "[[entity]]\nname = \"c{at}\"\nposition_m = [{x}, 0.02, 0]\nmass_kg = 0.1\n\
+             shape = {{ kind = \"box\", size_m = [0.04, 0.04, 0.04] }}\n"
+        )
+    });
+    let floor =
+        "[[entity]]\nname = \"floor\"\nshape = { kind = \"plane\", normal = [0, 1, 0], offset_m = 0 }\n";
+    let scene = format!("[[finger]]\nstart_m = [0, 0.5, 0]\n{floor}{}", cubes.collect::<String>());
+    for (lists, in_two_lists) in [("", false), ("lists = { fast_bodies = 3 }\n", true)] {
+        let place = Workplace::new();
+        place.write("scene.toml", format!("{lists}{scene}"));
+        let told = json(&check(&place, &["scene.toml", "--json"]));
+        let told = &told["summary"]["capacities"];
+        let number = |key: &str| told[key].as_f64().unwrap_or_else(|| panic!("{key}: {told}"));
+        assert_eq!(number("pairs"), 7.0, "{told}");
+        assert!(number("pair_room") >= 7.0, "{told}");
+        assert_eq!(told["slow_tick_ns"].is_number(), in_two_lists, "{told}");
+        if in_two_lists {
+            assert_eq!(number("slow_awake"), 6.0, "{told}");
+        } else {
+            assert_eq!(number("awake"), 6.0, "{told}");
+        }
+        assert!(number("fast_tick_at_rest_ns") < 1e6 && number("awake_body_ns") < 1e6, "{told}");
+        assert!(number("awake_bodies_in_a_tick") >= 1.0, "{told}");
+        let bytes = |name: &str, seconds: &str| {
+            let run = ["run", "scene.toml", "--headless", "--clock", "virtual", "--seconds", seconds];
+            let said = place.run(run.iter().chain(&["--record", name]));
+            let length = std::fs::metadata(place.path(name))
+                .unwrap_or_else(|error| panic!("{error}: {}", said.err))
+                .len();
+            length as f64
+        };
+        // Half a second is as long as an MCAP's chunk. What is written of forces that motors render is not in the estimate.
+        for (file, key, within) in [("a.csv", "csv_bytes_per_s", 1.05), ("a.mcap", "mcap_bytes_per_s", 1.5)] {
+            let found = 2.0 * (bytes(file, "1.0") - bytes(file, "0.5"));
+            let share = found / number(key);
+            assert!(1.0 / within < share && share < within, "{file}: {found} B/s, {told}");
+        }
+        let said = check(&place, &["scene.toml"]).out;
+        for line in [
+            "capacities     pairs near each other: 7 at the start",
+            "fast tick: ",
+            "things awake: ",
+            "recording: ",
+        ] {
+            assert!(said.contains(line), "{line}: {said}");
+        }
+        assert_eq!(said.contains("slow list: a tick takes "), in_two_lists, "{said}");
+    }
+}
