@@ -20,6 +20,9 @@ pub const ROW_QUEUE: usize = 8192;
 
 /// Changed bodies that may wait, of all rows together (180 MB); where more than 128 change in each row, fewer rows can.
 const BODY_QUEUE: usize = 1 << 20;
+/// The same of a world with more than so many, of which few change in a tick.
+const MANY: usize = 4096;
+const BODY_QUEUE_OF_MANY: usize = 1 << 18;
 
 /// What is no body and was moved, for each row that may wait.
 const PLACED_A_ROW: usize = 4;
@@ -53,7 +56,7 @@ pub struct RowReceiver {
 
 /// A queue for rows with so many bodies each.
 pub fn row_queue(bodies: usize) -> (RowSender, RowReceiver) {
-    row_queue_of(ROW_QUEUE, BODY_QUEUE, bodies)
+    row_queue_of(ROW_QUEUE, if bodies > MANY { BODY_QUEUE_OF_MANY } else { BODY_QUEUE }, bodies)
 }
 
 /// A queue for so many rows with so many bodies each, and for no more of those, if they have changed, than `most` of all rows

@@ -6,7 +6,7 @@
 //! | `/events` | `phantom3.Event` | when something happens |
 //! | `/orders` | `phantom3.Order` | when somebody ordered something; not there if nobody did |
 //! | `/scene`, of large scenes also `/scene/2` and so on | `foxglove.SceneUpdate` | once |
-//! | `/frames` | `foxglove.FrameTransforms`, of what moves by itself and of fingers | 50 times a second |
+//! | `/frames` | `foxglove.FrameTransforms`, of what moves by itself and of fingers; of many things those that have moved | 50 times a second |
 //! | `/frames/fixed` | `foxglove.FrameTransforms`, of everything else | once |
 //! | `/frames/moved` | `foxglove.FrameTransforms`, of what orders have moved of that | when it moves; not there if nothing did |
 //! | `/fingers` | `foxglove.SceneUpdate` | 50 times a second |
@@ -84,6 +84,9 @@ pub struct McapFile {
     /// The chunk has a tick with all bodies, and the newest one these.
     chunk_has_all: bool,
     last_bodies: Vec<BodyRow>,
+    /// The chunk has a picture of all bodies, and the newest one these.
+    chunk_shows_all: bool,
+    shown_bodies: Vec<BodyRow>,
     /// Things that are no bodies and have been moved, as they were told last.
     last_placed: Vec<Placed>,
     /// What the chunk has, and its first tick.
@@ -167,6 +170,8 @@ impl McapFile {
             sequence: 0,
             chunk_has_all: false,
             last_bodies: Vec::new(),
+            chunk_shows_all: false,
+            shown_bodies: Vec::new(),
             last_placed: Vec::new(),
             chunk_bytes: 0,
             chunk_rows: 0,
@@ -260,7 +265,8 @@ impl McapFile {
         self.writer.flush()?;
         self.rows += self.chunk_rows;
         self.last_tick = self.last_in_chunk;
-        (self.chunk_rows, self.chunk_bytes, self.chunk_has_all) = (0, 0, false);
+        (self.chunk_rows, self.chunk_bytes) = (0, 0);
+        (self.chunk_has_all, self.chunk_shows_all) = (false, false);
         Ok(())
     }
 
@@ -406,7 +412,16 @@ impl McapFile {
         if time_ns >= self.next_picture {
             self.next_picture = (time_ns / PICTURE_NS + 1) * PICTURE_NS;
             message.clear();
-            self.view.frames(&mut message, time_ns, row, bodies, &self.names);
+            if self.chunk_bytes + MOST_BODY_BYTES * bodies.len() > MOST_CHUNK_BYTES {
+                self.end_chunk()?;
+            }
+            let shown = self.chunk_shows_all.then_some(&self.shown_bodies[..]);
+            self.view.frames(&mut message, time_ns, row, (bodies, shown), &self.names);
+            self.chunk_shows_all = true;
+            if bodies.len() > tick::ALWAYS {
+                self.shown_bodies.clear();
+                self.shown_bodies.extend_from_slice(bodies);
+            }
             written = written.and_then(|()| self.put(self.channels.frames, row.run_tick, message.bytes()));
             if placed != self.last_placed {
                 self.last_placed.clear();
@@ -693,6 +708,42 @@ mod tests {
         for topic in ["/scene", "/scene/2", "/scene/3"] {
             assert!(summary.channels.values().any(|channel| channel.topic == topic), "{topic}");
         }
+    }
+
+    #[test]
+    fn of_many_things_pictures_show_those_that_have_moved_and_all_once_in_a_chunk() {
+        let directory = tempfile::tempdir().expect("a directory");
+        let path = directory.path().join("r.mcap");
+        let bodies: Vec<String> = (0..100).map(|body| format!("body{body}")).collect();
+        let names = Names { entities: bodies.clone(), bodies, ..Names::default() };
+        let scene = world::Scene::parse("[[finger]]\n", Path::new("scene.toml")).expect("a scene");
+        let mut about = About::default();
+        about.tell("period_ns", "1000000".into());
+        let opened = Opened::recording(&path).expect("a file");
+        let view = View::new(&scene, &[], true);
+        let mut file = McapFile::create(opened, names, 1_000_000, &about, view).expect("room");
+        let mut rows = vec![BodyRow::default(); 100];
+        for run_tick in 0..1000 {
+            // One moves all the time, and one turns now and then.
+            rows[17].position.x += 1e-3;
+            rows[42].orientation.w = (run_tick / 100) as f64;
+            file.append(&Row { run_tick, ..Row::empty() }, &rows, &[]).expect("room");
+            if run_tick % 500 == 499 {
+                file.flush().expect("room");
+            }
+        }
+        assert_eq!(file.finish().expect("room"), 1000);
+        let bytes = std::fs::read(&path).expect("there");
+        let all = mcap::MessageStream::new(&bytes).expect("sound").map(|message| message.expect("sound"));
+        let frames = all.filter(|message| message.channel.topic == "/frames");
+        let shown: Vec<usize> = frames
+            .map(|message| message.data.windows(7).filter(|bytes| *bytes == b"object/").count())
+            .collect();
+        for (at, shown) in shown.iter().enumerate() {
+            let expected = if at % 25 == 0 { 100 } else { 1 + usize::from(at % 5 == 0) };
+            assert_eq!(*shown, expected, "picture {at}");
+        }
+        assert_eq!(shown.len(), 50);
     }
 
     #[test]

@@ -61,7 +61,7 @@ impl Bytes {
         if let Some(mcap) = self.mcap.as_mut().filter(|mcap| has_time && mcap.rows < MOST_ROWS) {
             let begin = Instant::now();
             mcap.rows += 1;
-            if mcap.recording.append(row, bodies).is_err() {
+            if mcap.recording.append(row, bodies, &[]).is_err() {
                 self.mcap = None;
             }
             self.left = self.left.saturating_sub(begin.elapsed());
