@@ -32,6 +32,7 @@ pub(super) fn too_much(rig: &Rig, entities: &[Entity], stands: &mut Stands) -> V
     let mut found = Found::default();
     let (near_all, radii) = (neighbours(entities), radii(rig));
     let every = every(&near_all, radii.len());
+    let every_alone = every_alone(&near_all, radii.len(), world.fields.len() + world.guides.len());
     let common = world.places_of_effects();
     let looks = common.len() * radii.len() * (world.fields.len() + world.guides.len() + FEW_THINGS);
     let every_common = looks.div_ceil(MOST_COMMON_LOOKS).max(1);
@@ -39,6 +40,7 @@ pub(super) fn too_much(rig: &Rig, entities: &[Entity], stands: &mut Stands) -> V
         for (index, near) in near_all.iter().enumerate().filter(|(_, near)| !near.is_empty()) {
             let above = drawn_at(&entities[index], radius_m);
             let all = places(&entities[index]).into_iter().chain(above);
+            let every = if near.len() > 1 { every } else { every_alone };
             for place_W in all.skip(index % every).step_by(every) {
                 world.judge((near, entities[index].space), radius_m, &place_W, stands, &mut found);
             }
@@ -54,10 +56,11 @@ pub(super) fn too_much(rig: &Rig, entities: &[Entity], stands: &mut Stands) -> V
             "so much reaches into other things here that one place in {every} was looked at for what is too strong together"
         ));
     }
-    if every_common > 1 {
+    let every_of_effects = every_common.max(every_alone);
+    if every_of_effects > 1 {
         told.push(format!(
-            "so many fields and guides meet so many things here that one place in {every_common} of these was looked at for what \
-             is too strong together"
+            "so many fields and guides meet so many things here that one place in {every_of_effects} was looked at for what is too \
+             strong together"
         ));
     }
     told
@@ -68,6 +71,13 @@ fn every(near: &[Vec<u32>], radii: usize) -> usize {
     let crowded = near.iter().map(Vec::len).filter(|things| *things > 1);
     let looks = crowded.sum::<usize>() * PLACES * radii;
     looks.div_ceil(MOST_LOOKS).max(1)
+}
+
+/// The same of things that nothing else reaches into, but perhaps so many effects.
+fn every_alone(near: &[Vec<u32>], radii: usize, effects: usize) -> usize {
+    let alone = near.iter().filter(|things| things.len() == 1).count();
+    let looks = alone * PLACES * radii * (effects + FEW_THINGS);
+    if effects == 0 { 1 } else { looks.div_ceil(MOST_LOOKS_ALONE).max(1) }
 }
 
 /// All that fingers feel.
@@ -199,9 +209,12 @@ impl<'a> World<'a> {
 
     /// Fields and guides that are felt at a place.
     fn effects_at(&self, place_W: &Vector3<f64>) -> Vec<(usize, Gains)> {
-        let fields = self.fields.iter().map(|field| field.gains_at(place_W));
-        let guides = self.guides.iter().map(|guide| guide.gains_at(place_W));
-        let all = fields.chain(guides).enumerate().map(|(at, gains)| (self.entities.len() + at, gains));
+        // Those of a constant one are none.
+        let is_constant = |field: &Field| matches!(field.kind(), FieldKind::Constant { .. });
+        let fields = self.fields.iter().enumerate().filter(|(_, field)| !is_constant(field));
+        let fields = fields.map(|(at, field)| (at, field.gains_at(place_W)));
+        let guides = (self.fields.len()..).zip(self.guides.iter().map(|guide| guide.gains_at(place_W)));
+        let all = fields.chain(guides).map(|(at, gains)| (self.entities.len() + at, gains));
         all.filter(|(_, gains)| *gains != Gains::default()).collect()
     }
 
@@ -536,6 +549,8 @@ const PLACES: usize = 1 + 26 * SHARES.len();
 const MOST_LOOKS: usize = 60_000;
 /// Effects that are asked at places of effects, for all places and fingers together.
 const MOST_COMMON_LOOKS: usize = 1_500_000;
+/// The same at places of things that nothing else reaches into.
+const MOST_LOOKS_ALONE: usize = 20_000_000;
 /// To touch what is at a place takes as long as to ask so many effects.
 const FEW_THINGS: usize = 32;
 /// Places from which a larger force is looked for.
@@ -576,6 +591,17 @@ mod tests {
         let sum = Sum { value: 12.0, limit: 10.0, place_W: Vector3::new(0.0123456, -1e-9, 2.0) };
         let told = Kind::Force.told("a, b", &sum);
         assert!(told.contains(" at (0.012346, 0, 2) feels 12.0 N"), "{told}");
+    }
+
+    #[test]
+    fn of_things_in_many_fields_so_many_places_are_looked_at_that_the_looks_are_bounded() {
+        let alone = |things: usize| vec![vec![0]; things];
+        assert_eq!([every_alone(&alone(3000), 8, 0), every_alone(&alone(1000), 1, 64)], [1; 2]);
+        for (things, radii, effects) in [(3000, 8, 64), (10_000, 1, 256), (50_000, 16, 1)] {
+            let every = every_alone(&alone(things), radii, effects);
+            let looks = things * radii * (effects + FEW_THINGS) * PLACES / every;
+            assert!(every > 1 && looks <= MOST_LOOKS_ALONE, "{things} {radii} {effects}: {every} {looks}");
+        }
     }
 
     #[test]

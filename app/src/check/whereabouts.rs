@@ -58,7 +58,7 @@ mod tests {
         let spread = |i: u32, step: f64| 2.0 * (f64::from(i) * step).fract() - 1.0;
         let ball = |i: u32| {
             let centre = Vector3::new(spread(i, 0.618_034), spread(i, 0.414_214), spread(i, 0.732_051));
-            (i % 50 != 0).then(|| (centre, 10f64.powi(-((i % 5) as i32)) * 0.5))
+            (!i.is_multiple_of(50)).then(|| (centre, 10f64.powi(-((i % 5) as i32)) * 0.5))
         };
         let all: Vec<_> = (0..500).map(|i| (i, ball(i))).collect();
         let whereabouts = Whereabouts::of(all.iter().copied());
