@@ -912,9 +912,13 @@ fn check_tells_what_a_scene_takes_as_a_run_takes_it() {
                 .len();
             length as f64
         };
-        // Half a second is as long as an MCAP's chunk. What is written of forces that motors render is not in the estimate.
-        for (file, key, within) in [("a.csv", "csv_bytes_per_s", 1.05), ("a.mcap", "mcap_bytes_per_s", 1.5)] {
-            let found = 2.0 * (bytes(file, "1.0") - bytes(file, "0.5"));
+        // Half a second is as long as an MCAP's chunk; but for its first row, which comes with what stands before it. What is in
+        // the slow list has come to rest before its rows are written.
+        let [of_table, of_mcap] = if in_two_lists { [1.5; 2] } else { [1.01, 1.3] };
+        for (file, key, within) in
+            [("a.csv", "csv_bytes_per_s", of_table), ("a.mcap", "mcap_bytes_per_s", of_mcap)]
+        {
+            let found = (bytes(file, "0.5") - bytes(file, "0.001")) / 0.499;
             let share = found / number(key);
             assert!(1.0 / within < share && share < within, "{file}: {found} B/s, {told}");
         }
