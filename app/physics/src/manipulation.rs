@@ -106,7 +106,7 @@ pub struct Manipulation {
     has_changed: Box<[bool]>,
 }
 
-/// How a manipulation begins.
+/// Beginning of a manipulation.
 #[derive(Debug, Clone, Copy)]
 pub struct Begins<'b> {
     /// It steps the bodies; else somebody else does, all of them.
@@ -114,7 +114,7 @@ pub struct Begins<'b> {
     /// Its ticks allocate nothing. Where they may, room for pairs is made when it is needed: none is left out, and there is
     /// little more than is used.
     pub has_deadlines: bool,
-    /// What is known already of where the entities are.
+    /// Boxes of the entities, where they are known already.
     pub broad_phase: Option<&'b BroadPhase>,
 }
 

@@ -22,7 +22,7 @@ use shm_abi::{Command, Frame};
 use std::time::{Duration, Instant};
 use world::lists::SlowList;
 
-/// What a scene takes, and what this machine has room and time for.
+/// Needs of a scene, and the room and time that this machine has.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Capacities {
     period_ns: u64,
@@ -36,7 +36,7 @@ pub(super) struct Capacities {
     at_rest: (f64, usize),
     /// Fast tick with as many awake as there were, or as many as the fast list keeps (ns), and how many.
     awake: (f64, usize),
-    /// What one thing that is awake takes in a tick (ns); `None`: nothing moves.
+    /// Time of a tick for each thing that is awake (ns); `None`: nothing moves.
     each_ns: Option<f64>,
     /// Tick of the slow list with all awake (ns), and how many; `None`: there is no slow list.
     slow: Option<(f64, usize)>,

@@ -189,14 +189,10 @@ mod tests {
         let ups = [Vector3::y(), Vector3::new(0.3, 1.0, -0.2).normalize(), -Vector3::x()];
         for up_W in ups {
             let (mut fall, mut land) = (0, 0);
-            for upper in 0..entities.len() {
+            for (upper, entity) in entities.iter().enumerate() {
                 let first = under.first(upper, &up_W);
                 let expected = under.first_of(&everything, upper, &up_W);
-                assert_eq!(
-                    first,
-                    expected.filter(|_| Aabb::of_entity(&entities[upper]).is_some()),
-                    "{upper} {up_W}"
-                );
+                assert_eq!(first, expected.filter(|_| Aabb::of_entity(entity).is_some()), "{upper} {up_W}");
                 *(if first.is_some() { &mut land } else { &mut fall }) += 1;
             }
             assert!(land > 20 && fall > 0, "{land} {fall}");
