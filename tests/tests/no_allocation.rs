@@ -420,7 +420,7 @@ fn play_scene(file: &Path, fingers: usize, least: u64) -> FastLoop {
     cycle.grant(view);
     cycle.change_lease();
     let step = rig.fast_step().unwrap();
-    let (rows, mut taken) = row_queue_of(1024, step.bodies().len());
+    let (rows, mut taken) = row_queue_of(1024, usize::MAX, step.bodies().len());
     let (events, mut event_ends) = world::events::event_queue(256);
     let mut fast = FastLoop::new(step, rows, WhenFull::Drop, TICKS, period_ns).with_events(events);
     let mut told = 0;
