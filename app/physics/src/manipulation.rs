@@ -124,6 +124,8 @@ impl Default for Begins<'_> {
     }
 }
 
+/// Pairs that have room at first even where more is made when it is needed: of a small world all.
+const FEW_PAIRS: usize = 512;
 /// The most touches of fingers in a tick.
 const MAX_TOUCHES: usize = 64;
 /// Contact points between entities that have room at first, or so many of each body if that is more; until there is
@@ -197,7 +199,7 @@ impl Manipulation {
         let pairs = if has_deadlines {
             Pairs::with_capacity(at_first, most_pairs)
         } else {
-            Pairs::growing(most_pairs)
+            Pairs::growing(at_first.min(FEW_PAIRS), most_pairs)
         };
         let rows = RowCounts {
             of_pairs: (at_first.next_multiple_of(pairs::CHUNK) * MAX_POINTS)

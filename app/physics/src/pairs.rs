@@ -112,9 +112,9 @@ impl Pairs {
         }
     }
 
-    /// Without room, of which more is made whenever it is needed: for who has no deadlines. None is left out then.
-    pub(crate) fn growing(most: usize) -> Self {
-        Self { grows: true, ..Self::with_capacity(0, most) }
+    /// Room for so many at first, of which more is made whenever it is needed: for who has no deadlines. None is left out then.
+    pub(crate) fn growing(at_first: usize, most: usize) -> Self {
+        Self { grows: true, ..Self::with_capacity(at_first, most) }
     }
 
     /// A place for one more; of those that grow there is one.
