@@ -329,7 +329,7 @@ impl FastStep {
                 row.force_on_user += finger.feel(felt, &self.effects, &self.entities, hip, moment);
             }
         }
-        self.objects.note(&self.entities, row.run_tick);
+        self.objects.note(&self.entities);
         if frame.run_tick >= 0 {
             let (entities, felt) = (&mut self.entities, &self.finger_effects);
             self.objects.step(entities, &self.fingers, felt, &mut row.fingers, dt_s);

@@ -80,6 +80,6 @@ pub struct BodyRow {
     pub grasp: GraspQuality,
     /// Whether it is in the slow list; recorded where the scene has two.
     pub is_slow: bool,
-    /// The earlier tick of the run as of which it stands and moves so, of what moves in the slow list; recorded as that is.
+    /// The tick of the run as of which it stands and moves so, of what does not rest in the slow list; recorded as that is.
     pub as_of: Option<u64>,
 }

@@ -271,7 +271,7 @@ impl Objects {
     }
 
     /// Takes note of how the bodies are, and of where others stand that are moved.
-    pub fn note(&mut self, entities: &[Entity], run_tick: u64) {
+    pub fn note(&mut self, entities: &[Entity]) {
         self.placed.clear();
         let manipulation = &self.manipulation;
         let others = manipulation.driven().filter(|entity| !manipulation.is_body(*entity));
@@ -279,18 +279,18 @@ impl Objects {
         self.changed.clear();
         self.changed.extend_from_slice(self.manipulation.changed());
         self.manipulation.forget_changes();
-        self.note_changed(run_tick);
+        self.note_changed();
     }
 
     fn note_all(&mut self) {
         self.manipulation.forget_changes();
-        self.note_changed(0);
+        self.note_changed();
     }
 
-    fn note_changed(&mut self, run_tick: u64) {
+    fn note_changed(&mut self) {
         for &number in &self.changed {
             let is_slow = self.is_slow(number as usize);
-            let as_of = self.as_of(number as usize, run_tick);
+            let as_of = self.as_of(number as usize);
             let (row, body) = (&mut self.rows[number as usize], &self.manipulation.bodies()[number as usize]);
             let (pose, spin_W) = (body.pose(), body.angular_velocity_W());
             let from_centre_W = pose.translation.vector - body.centre_W;
@@ -306,12 +306,9 @@ impl Objects {
         }
     }
 
-    /// The tick of the run as of which a body that moves in the slow list stands where it does, if that was before this one.
-    fn as_of(&self, number: usize, run_tick: u64) -> Option<u64> {
-        let lists = self.lists.as_ref().filter(|_| self.is_slow(number))?;
-        let (tick, body) = (lists.hand_over.as_of(number), &self.manipulation.bodies()[number]);
-        let rests = body.velocity_W == Vector3::zeros() && body.angular_momentum_W == Vector3::zeros();
-        (!rests && tick < run_tick).then_some(tick)
+    /// The tick of the run as of which a body of the slow list stands where it does, unless it rests.
+    fn as_of(&self, number: usize) -> Option<u64> {
+        self.lists.as_ref().filter(|_| self.is_slow(number))?.hand_over.as_of(number)
     }
 
     /// Nothing moves before a run begins: what fingers feel of bodies is what was rendered.

@@ -280,27 +280,36 @@ fn what_flies_by_near_a_finger_does_not_leap_and_tells_as_of_when_it_is_there() 
     let mut run = Run::new(&format!("{ALL_SLOW}{FLOATING}{balls}"));
     let hip = [0.8, 0.06, 0.5];
     let (mut near, mut leaps, mut oldest) = (0, 0, [0, 0]);
-    let mut before: Vec<_> = run.step.bodies().to_vec();
+    let began: Vec<_> = run.step.bodies().to_vec();
+    let mut before = began.clone();
     for tick in 0..400 {
         run.tick(hip, true);
-        for (body, before) in run.step.bodies().iter().zip(&before) {
+        for (body, (before, began)) in run.step.bodies().iter().zip(before.iter().zip(&began)) {
             let is_near = (body.position - Vector3::from(hip)).norm() < 0.09;
             let step_m = (body.position - before.position).norm();
             assert!(!is_near || step_m < 2e-3 + 1e-12, "tick {tick}: {step_m} m");
             near += usize::from(is_near);
             leaps += usize::from(step_m > 9e-3);
+            // On its way it is there between two ticks.
+            let as_of = body.as_of.expect("it does not rest");
+            let way_m = body.position.x - began.position.x;
+            assert!(
+                (-1e-9..1e-3).contains(&(way_m - 1e-3 * as_of as f64)),
+                "tick {tick}, as of {as_of}: {way_m}"
+            );
             // After the first turns, and the words of them.
             if tick > 100 {
                 let age = &mut oldest[usize::from(!is_near)];
-                *age = body.as_of.map_or(0, |as_of| tick - as_of).max(*age);
+                *age = (tick - as_of).max(*age);
             }
         }
         before = run.step.bodies().to_vec();
     }
     assert_eq!(run.here(), 0);
     assert!(near > 400 * 8 && leaps > 1000, "{near} near, {leaps} leaps elsewhere");
-    // A turn's ten ticks, the tick that makes it, and the one that takes it in; 320 places a turn for 1000 elsewhere.
-    assert!(oldest[0] <= 12 && (20..=60).contains(&oldest[1]), "{oldest:?}");
+    // A turn's ten ticks, and up to nine for a way of 10 mm, on half of which 2 mm in a tick are the bound; 320 places a turn for
+    // 1000 elsewhere.
+    assert!(oldest[0] <= 19 && (20..=60).contains(&oldest[1]), "{oldest:?}");
 }
 
 #[test]

@@ -126,6 +126,6 @@ fn clip(piece: &mut [f64; 2], levels: [f64; 2], most: f64) -> Option<()> {
 }
 
 /// Of the extent: nearer to a face is on it.
-const ON: f64 = 1e-10;
+const ON: f64 = 1e-13;
 /// Boxes and faces that are looked at, for all rims.
 const MOST_LOOKS: usize = 20_000_000;

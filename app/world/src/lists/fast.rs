@@ -63,8 +63,8 @@ pub struct FastList {
     /// Where fingers are.
     hips: Hips,
     glides: Glides,
-    /// Of each body, the run's tick as of which it stands where it was told to be last.
-    as_of: Box<[u64]>,
+    /// Of each body, the run's tick as of which it stands where it is here, and whether it rests there.
+    as_of: Box<[(u64, bool)]>,
     handed: Handed,
 }
 
@@ -86,7 +86,7 @@ impl FastList {
             fetched: Vec::with_capacity(MAX_DRIVEN),
             hips: Hips::none(),
             glides: Glides::new(bodies),
-            as_of: vec![0; bodies].into(),
+            as_of: vec![(0, false); bodies].into(),
             handed: Handed::default(),
         }
     }
@@ -148,9 +148,10 @@ impl FastList {
         }
     }
 
-    /// The tick of the run as of which a body that is in the slow list stands where it is here.
-    pub fn as_of(&self, body: usize) -> u64 {
-        self.as_of[body]
+    /// The tick of the run as of which a body that is in the slow list stands where it is here, unless it rests.
+    pub fn as_of(&self, body: usize) -> Option<u64> {
+        let (tick, rests) = self.as_of[body];
+        (!rests).then_some(tick)
     }
 
     /// Before a tick, the run's of this number and length (s): takes in what has come, and claims what the fingers, or what is
@@ -228,16 +229,21 @@ impl FastList {
             |stand: &Stand| !held.contains(&stand.body) && stays[stand.body as usize] == stand.stay;
         for stand in take(&mut end.stands) {
             let body = stand.body as usize;
-            let is_newest = stand.as_of >= as_of[body];
+            let (was_told, _) = as_of[body];
+            let is_newest = stand.as_of >= was_told;
             if is_newest && is_there(&stand) && manipulation.standing(body) == Standing::Elsewhere {
-                as_of[body] = stand.as_of;
-                if let Some(stand) = glides.take(stand, &manipulation.bodies()[body], hips) {
+                let now = (&manipulation.bodies()[body], was_told);
+                if let Some(stand) = glides.take(stand, now, hips) {
+                    as_of[body] = (stand.as_of, stand.rests);
                     manipulation.stands_elsewhere(body, &stand.state, entities, settings.ahead_s);
                 }
             }
         }
         let goes_on = |stand: &Stand, standing: Standing| is_there(stand) && standing == Standing::Elsewhere;
-        glides.step(manipulation, entities, (dt_s, settings.ahead_s), goes_on);
+        let lengths_s = (dt_s, settings.ahead_s);
+        glides.step((manipulation, entities), lengths_s, hips, goes_on, |stand, tick| {
+            as_of[stand.body as usize] = (tick, stand.rests && tick == stand.as_of);
+        });
         self.take_in_parcels(manipulation, entities);
     }
 
@@ -296,7 +302,7 @@ impl FastList {
         if goes {
             for &body in &island {
                 self.stays[body] += 1;
-                self.as_of[body] = self.hips.run_tick;
+                self.as_of[body] = (self.hips.run_tick + 1, false);
             }
             self.here.retain(|body| island.binary_search(&(*body as usize)).is_err());
             self.handed.went += island.len() as u64;

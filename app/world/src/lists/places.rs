@@ -4,7 +4,7 @@
 //! near has to stand where it is all the same, and must not leap while somebody looks.
 //!
 //! Model: the slow side knows where fingers were lately ([`Hips`]). What is near a finger has a queue of its own ([`Stands`]),
-//! which the fast side takes in first; so no place of it waits behind others. In each turn the slow side tells as many places as
+//! of which the fast side takes in most of what a tick may; so no place of it waits behind others, nor others for ever. In each turn the slow side tells as many places as
 //! there is room for ([`Untold`]), by the way since each was told last; so nobody waits for ever. On the fast side what is near a finger goes the way to its new
 //! place within a few ticks ([`Glides`]), no faster in a tick than [`MOST_LEAP_M`] or twice its own speed.
 //! Invariants: the fast side's part allocates nothing and is bounded in each tick.
@@ -20,16 +20,19 @@ const NEAR_M: f64 = 0.1;
 const MOST_LEAP_M: f64 = 1.5e-3;
 /// Of the way that is left, so much in a tick.
 const SHARE: f64 = 0.5;
+/// Of a tick: what is less is none.
+const ROUNDING: f64 = 1e-6;
 /// Nearer than this a thing is where it is to be \[m\].
 const THERE_M: f64 = 1e-6;
 /// A turn that leaves a place untold counts as so much of a way \[m\].
 const TURN_M: f64 = 1e-4;
 /// So many things go their way at once; others leap.
-const MOST_GLIDES: usize = 64;
+const MOST_GLIDES: usize = 128;
 /// So many places are on their way, near fingers and elsewhere: what some ticks take in.
 const MOST_STANDS: [usize; 2] = [64, 256];
-/// So many are taken in in a tick.
+/// So many are taken in in a tick, and of what is near no more than these while others wait.
 const STANDS_A_TICK: usize = 32;
+const NEAR_A_TICK: usize = 24;
 /// So many words of where fingers are wait: one of each tick.
 pub(super) const MOST_HIPS: usize = 64;
 /// So many fingers are told of.
@@ -41,8 +44,10 @@ pub(super) struct Stand {
     pub(super) body: u32,
     /// How often it had come to the slow list by then: an old one must not place a body that was away meanwhile.
     pub(super) stay: u32,
-    /// The tick of the run that the slow side knew of when it went there.
+    /// The tick of the run that begins with it there.
     pub(super) as_of: u64,
+    /// It does not move until the slow side says otherwise.
+    pub(super) rests: bool,
     pub(super) state: Body,
 }
 
@@ -55,8 +60,14 @@ pub(super) fn stands(bodies: usize) -> (Stands<Producer<Stand>>, Stands<Consumer
 }
 
 /// Those that a tick takes in.
-pub(super) fn take(from: &mut Stands<Consumer<Stand>>) -> impl Iterator<Item = Stand> {
-    let next = || from.iter_mut().find_map(|queue| queue.pop().ok());
+pub(super) fn take([near, far]: &mut Stands<Consumer<Stand>>) -> impl Iterator<Item = Stand> {
+    let mut taken = 0;
+    let next = move || {
+        let (first, second) =
+            if taken < NEAR_A_TICK { (&mut *near, &mut *far) } else { (&mut *far, &mut *near) };
+        taken += 1;
+        first.pop().or_else(|_| second.pop()).ok()
+    };
     std::iter::from_fn(next).take(STANDS_A_TICK)
 }
 
@@ -162,59 +173,84 @@ impl Untold {
 
 /// The fast side's bodies that go to where the slow side has them.
 pub(super) struct Glides {
-    to: Vec<Stand>,
+    all: Vec<Glide>,
+}
+
+/// A body on its way.
+struct Glide {
+    to: Stand,
+    /// The tick as of which it stands where it is on its way.
+    as_of: f64,
 }
 
 impl Glides {
     pub(super) fn new(bodies: usize) -> Self {
-        Self { to: Vec::with_capacity(bodies.min(MOST_GLIDES)) }
+        Self { all: Vec::with_capacity(bodies.min(MOST_GLIDES)) }
     }
 
-    /// Takes note of a place; gives it back if its body is to be there at once.
-    pub(super) fn take(&mut self, stand: Stand, now: &Body, hips: &Hips) -> Option<Stand> {
-        if let Some(to) = self.to.iter_mut().find(|to| to.body == stand.body) {
-            *to = stand;
+    /// Takes note of a place; gives it back if its body is to be there at once. So far that stands where it was in the tick
+    /// `as_of`.
+    pub(super) fn take(&mut self, to: Stand, (now, as_of): (&Body, u64), hips: &Hips) -> Option<Stand> {
+        if let Some(glide) = self.all.iter_mut().find(|glide| glide.to.body == to.body) {
+            // An older word may have waited among those of what is far.
+            if to.as_of >= glide.to.as_of {
+                glide.to = to;
+            }
             return None;
         }
-        let is_near = hips.are_near(&stand.state.centre_W) || hips.are_near(&now.centre_W);
-        if is_near && self.to.len() < self.to.capacity() {
-            self.to.push(stand);
+        if self.all.len() < self.all.capacity() && is_seen(&to, now, hips) {
+            self.all.push(Glide { to, as_of: as_of as f64 });
             return None;
         }
-        Some(stand)
+        Some(to)
     }
 
-    /// A tick of this length (s): everybody goes on, who is still to.
+    /// A tick of this length (s): everybody goes on, who is still to, and is told of with the tick as of which it is there.
     pub(super) fn step(
         &mut self,
-        manipulation: &mut Manipulation,
-        entities: &mut [Entity],
+        (manipulation, entities): (&mut Manipulation, &mut [Entity]),
         (dt_s, ahead_s): (f64, f64),
+        hips: &Hips,
         goes_on: impl Fn(&Stand, Standing) -> bool,
+        mut is_there: impl FnMut(&Stand, u64),
     ) {
-        self.to.retain(|to| {
+        self.all.retain_mut(|Glide { to, as_of }| {
             let body = to.body as usize;
             if !goes_on(to, manipulation.standing(body)) {
                 return false;
             }
             let now = &manipulation.bodies()[body];
-            let (between, is_there) = towards(now, &to.state, dt_s);
+            // What nobody looks at any more makes room.
+            let share = if is_seen(to, now, hips) { share(now, &to.state, dt_s) } else { 1.0 };
+            let between = between(now, &to.state, share);
             manipulation.stands_elsewhere(body, &between, entities, ahead_s);
-            !is_there
+            *as_of += share * (to.as_of as f64 - *as_of);
+            is_there(to, if share < 1.0 { (*as_of + ROUNDING) as u64 } else { to.as_of });
+            share < 1.0
         });
     }
 }
 
-/// A body's next place on its way to another, and whether it is there.
-fn towards(now: &Body, to: &Body, dt_s: f64) -> (Body, bool) {
-    let way_W = to.centre_W - now.centre_W;
+fn is_seen(to: &Stand, now: &Body, hips: &Hips) -> bool {
+    hips.are_near(&to.state.centre_W) || hips.are_near(&now.centre_W)
+}
+
+/// How much of its way to another place a body goes in a tick; 1: it is there then.
+fn share(now: &Body, to: &Body, dt_s: f64) -> f64 {
+    let way_m = (to.centre_W - now.centre_W).norm();
     let most_m = MOST_LEAP_M.max(2.0 * to.velocity_W.norm() * dt_s);
-    let share = SHARE.min(most_m / way_W.norm());
-    if way_W.norm() * (1.0 - share) < THERE_M {
-        return (*to, true);
+    let share = SHARE.min(most_m / way_m);
+    if way_m * (1.0 - share) < THERE_M { 1.0 } else { share }
+}
+
+/// A body so far on its way to another place, and as fast as there.
+fn between(now: &Body, to: &Body, share: f64) -> Body {
+    if share >= 1.0 {
+        return *to;
     }
+    let centre_W = now.centre_W + (to.centre_W - now.centre_W) * share;
     let orientation = now.orientation.try_slerp(&to.orientation, share, 1e-9).unwrap_or(to.orientation);
-    (Body { centre_W: now.centre_W + way_W * share, orientation, ..*to }, false)
+    Body { centre_W, orientation, ..*to }
 }
 
 #[cfg(test)]
@@ -249,7 +285,7 @@ mod tests {
                 untold.add(number);
             }
             untold.tell(&hips, &mut into, |body| {
-                Some(Stand { body: body as u32, stay: 0, as_of: turn, state: bodies[body] })
+                Some(Stand { body: body as u32, stay: 0, as_of: turn, rests: false, state: bodies[body] })
             });
             for _ in 0..2 {
                 take(&mut out).for_each(|stand| told[stand.body as usize] = stand.as_of);
@@ -268,6 +304,27 @@ mod tests {
         assert!(waited(&told[..500]) > 1.5 * waited(&told[500..]), "by the way that they went");
     }
 
+    /// As many as a turn has places for, and a finger among them.
+    #[test]
+    fn what_is_far_is_told_though_more_is_near_than_there_are_places() {
+        let bodies: Vec<Body> = (0..300).map(|number| at(if number < 200 { 5.0 } else { 9.0 })).collect();
+        let mut untold = Untold::new(&bodies);
+        let (mut into, mut out) = stands(bodies.len());
+        let mut told = vec![0; bodies.len()];
+        for turn in 1..=100 {
+            (0..bodies.len()).for_each(|body| untold.add(body));
+            untold.tell(&finger_at(5.0), &mut into, |body| {
+                Some(Stand { body: body as u32, stay: 0, as_of: turn, rests: false, state: bodies[body] })
+            });
+            for _ in 0..2 {
+                take(&mut out).for_each(|stand| told[stand.body as usize] = stand.as_of);
+            }
+        }
+        // 16 of 100 in a turn, and a queue of 256; 48 of 200, and a queue of 64.
+        assert!(told[200..].iter().all(|told| 100 - told <= 24), "{:?}", &told[200..]);
+        assert!(told[..200].iter().all(|told| 100 - told <= 6), "{:?}", &told[..200]);
+    }
+
     #[test]
     fn what_is_asleep_is_told_once_and_what_is_gone_not_at_all() {
         let bodies = [at(0.0), at(1.0)];
@@ -276,7 +333,7 @@ mod tests {
         (0..2).for_each(|body| untold.add(body));
         for told in [vec![0], vec![]] {
             untold.tell(&Hips::none(), &mut into, |body| {
-                (body == 0).then(|| Stand { body: 0, stay: 0, as_of: 0, state: bodies[0] })
+                (body == 0).then(|| Stand { body: 0, stay: 0, as_of: 0, rests: true, state: bodies[0] })
             });
             let came: Vec<u32> = take(&mut out).map(|stand| stand.body).collect();
             assert_eq!(came, told);
@@ -291,11 +348,12 @@ mod tests {
             let to = Body { velocity_W: Vector3::new(speed_m_s, 0.0, 0.0), ..at(way_m) };
             let (mut now, mut ticks) = (at(0.0), 0);
             loop {
-                let (next, is_there) = towards(&now, &to, 1e-3);
+                let share = share(&now, &to, 1e-3);
+                let next = between(&now, &to, share);
                 let step_m = (next.centre_W - now.centre_W).norm();
                 assert!(step_m <= MOST_LEAP_M.max(2e-3 * speed_m_s) + 1e-12, "{way_m}: {step_m}");
                 (now, ticks) = (next, ticks + 1);
-                if is_there {
+                if share >= 1.0 {
                     break;
                 }
             }

@@ -237,8 +237,12 @@ impl SlowList {
         manipulation.forget_changes();
         untold.tell(hips, &mut end.stands, |body| {
             let state = manipulation.bodies()[body];
-            let is_here = manipulation.standing(body) != Standing::Elsewhere;
-            is_here.then_some(Stand { body: body as u32, stay: stays[body], as_of: hips.run_tick, state })
+            let standing = manipulation.standing(body);
+            let rests = matches!(standing, Standing::Asleep | Standing::Parked);
+            // It has made the tick that fingers were told in.
+            let as_of = hips.run_tick + 1;
+            let stand = Stand { body: body as u32, stay: stays[body], as_of, rests, state };
+            (standing != Standing::Elsewhere).then_some(stand)
         });
     }
 }
