@@ -55,7 +55,6 @@ mod query;
 mod repair;
 mod report;
 mod rolling;
-mod sealed;
 mod sliver;
 mod soup;
 mod topology;

@@ -210,15 +210,8 @@ impl Understood {
     /// Consequence for a finger.
     fn felt(&self) -> String {
         let sheets = self.report.sheets.count;
-        let is_sealed = sheets > 0 && self.report.sealed_parts.count == sheets;
         match (self.mesh.sides(), self.mesh.has_inside()) {
             (Sides::Solid, _) => "from outside; a finger does not get in".into(),
-            (Sides::Sheet, false) if is_sealed => {
-                "from both sides, as sheets: their rims lie on each other's faces, and no finger comes in there".into()
-            }
-            (Sides::Sheet, true) if is_sealed => format!(
-                "solid parts from outside; the others ({sheets}) from both sides, as sheets whose rims lie on other faces"
-            ),
             (Sides::Sheet, false) => {
                 "from both sides, as a sheet: a finger that comes in through a hole is free within, and feels it from inside".into()
             }

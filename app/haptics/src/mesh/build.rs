@@ -125,7 +125,6 @@ impl Mesh {
             extremes: OnceLock::new(),
         };
         report.crossed = mesh.mark_crossed(&parts);
-        mesh.note_sealed(&parts, &mut report);
         mesh.turn_outward(&parts, &mut report);
         let is_fitting;
         (report.narrow_gaps, is_fitting) = mesh.mark_beside(&parts);

@@ -140,14 +140,8 @@ pub struct MeshReport {
     pub closed_holes: Finding,
     /// Parts that have no inside, since they are open or cannot be oriented. The face is the first of the part.
     pub sheets: Finding,
-    /// Those of them that have a rim which does not lie on other faces, or none; and those of which all rims do.
-    pub open_parts: Finding,
-    /// As `open_parts` says.
-    pub sealed_parts: Finding,
     /// Edges where the mesh ends: the rim of an open mesh, or a crack.
     pub boundary_edges: Finding,
-    /// Those of them that lie on other faces.
-    pub sealed_edges: usize,
     /// Edges across which inside and outside change places: the mesh cannot be oriented.
     pub turned_edges: Finding,
     /// Faces of the mesh that others pass through.
@@ -211,16 +205,10 @@ impl fmt::Display for MeshReport {
             ),
             (self.closed_holes, "hole", "holes", "closed with a lid"),
             (
-                self.open_parts,
+                self.sheets,
                 "part",
                 "parts",
                 "not closed: felt from both sides; a finger that comes in by a rim is free within",
-            ),
-            (
-                self.sealed_parts,
-                "part",
-                "parts",
-                "not closed, all its rims on other faces: felt from both sides, as walls that end there",
             ),
             (self.boundary_edges, "edge", "edges", "of one face only: an open rim or a crack"),
             (self.turned_edges, "edge", "edges", "where outside becomes inside: it cannot be oriented"),
@@ -250,9 +238,6 @@ impl fmt::Display for MeshReport {
         }
         if self.open_holes.count > 0 {
             write!(f, "\n{}", self.open_holes)?;
-            if self.boundary_edges.count == self.sealed_edges {
-                f.write_str("; all rims lie on other faces")?;
-            }
         }
         Ok(())
     }
