@@ -1,9 +1,8 @@
 //! Capacities of a scene on this machine: pairs, things that may be awake, ticks, and bytes of recordings.
 //!
 //! Model: the scene's own world is stepped for a few hundred ticks, with fingers that rest where they begin; the slow list by
-//! itself, a tick at a time, with all awake. Counts are exact, and so are the bytes of a table of as many rows; times are
-//! medians of what was measured, without real-time rights, and what follows from them is an estimate. The rows go into tables
-//! and an MCAP in memory.
+//! itself, a tick at a time, with all awake. Counts are exact; times are medians of what was measured, without real-time rights,
+//! and what follows from them is an estimate. Bytes of recordings are the most: of rows in which everything moves.
 //! Cost: a third of a second, and three ticks of the slow list where these take longer.
 
 #![allow(non_snake_case)] // Frames are capital letters.
@@ -15,7 +14,7 @@ use crate::pace::Pace;
 use crate::rig::Rig;
 use crate::row::Row;
 use bytemuck::Zeroable;
-use recorded::Bytes;
+use recorded::most_bytes_a_row;
 use serde_json::{Value, json};
 use shm_abi::frame::DEVICE_POSITION_VALID;
 use shm_abi::{Command, Frame};
@@ -40,7 +39,7 @@ pub(super) struct Capacities {
     each_ns: Option<f64>,
     /// Tick of the slow list with all awake (ns), and how many; `None`: there is no slow list.
     slow: Option<(f64, usize)>,
-    /// Bytes of a second of recording, at every tick: a table, and an MCAP.
+    /// The most bytes of a second of recording: a table, and an MCAP.
     csv_bytes_s: f64,
     mcap_bytes_s: Option<f64>,
 }
@@ -56,7 +55,7 @@ impl Capacities {
         let pairs = of_fast + slow.as_ref().map_or(0, |slow| slow.manipulation().pair_count());
         let moving = step.bodies().len();
         let slow_ticks = slow.as_mut().map(|slow| slow_ticks(slow, rig.period_ns));
-        let (ticks, bytes) = fast_ticks(rig, step, slow.as_mut());
+        let ticks = fast_ticks(rig, step, slow.as_mut());
         let (least, most) = (ticks.iter().map(|tick| tick.1).min()?, ticks.iter().map(|tick| tick.1).max()?);
         let at_rest = (median(&ticks, least)?, least);
         let fast = (median(&ticks, most)?, most);
@@ -75,7 +74,8 @@ impl Capacities {
             _ => fast,
         };
         let rate_hz = 1e9 / rig.period_ns as f64;
-        let [csv_bytes_s, mcap_bytes_s] = bytes.a_row().map(|bytes| bytes.map(|bytes| bytes * rate_hz));
+        let bytes = most_bytes_a_row(rig, step.entities(), step.bodies().to_vec());
+        let [csv_bytes_s, mcap_bytes_s] = bytes.map(|bytes| bytes.map(|bytes| bytes * rate_hz));
         let csv_bytes_s = csv_bytes_s?;
         let slow = of_slow;
         Some(Self {
@@ -142,7 +142,8 @@ impl Capacities {
             ));
         }
         let mcap = self.mcap_bytes_s.map_or(String::new(), |bytes| format!(", {} as MCAP", in_bytes(bytes)));
-        lines.push(format!("recording: {} a second as CSV{mcap} (estimated)", in_bytes(self.csv_bytes_s)));
+        let most = format!("recording: at most {} a second as CSV{mcap}", in_bytes(self.csv_bytes_s));
+        lines.push(format!("{most}, while everything moves (estimated)"));
         lines
     }
 
@@ -177,9 +178,8 @@ fn slow_ticks(slow: &mut SlowList, period_ns: u64) -> Ticks {
     ticks.split_off(1)
 }
 
-/// Ticks of the fast list, with fingers where they begin, and what they write.
-fn fast_ticks(rig: &Rig, step: &mut FastStep, mut slow: Option<&mut SlowList>) -> (Ticks, Bytes) {
-    let mut bytes = Bytes::new(rig, step.entities(), step.bodies().len());
+/// Ticks of the fast list, with fingers where they begin.
+fn fast_ticks(rig: &Rig, step: &mut FastStep, mut slow: Option<&mut SlowList>) -> Ticks {
     let (mut frame, mut command, mut row) = (frame(rig), Command::zeroed(), Row::empty());
     let (mut left, mut ticks) = (FAST_BUDGET, Ticks::new());
     for tick in 1..=MOST_TICKS {
@@ -195,9 +195,8 @@ fn fast_ticks(rig: &Rig, step: &mut FastStep, mut slow: Option<&mut SlowList>) -
         if left.is_zero() && ticks.len() >= LEAST_TICKS {
             break;
         }
-        bytes.add(&row, step.bodies());
     }
-    (ticks, bytes)
+    ticks
 }
 
 /// All devices where their fingers begin.

@@ -152,7 +152,7 @@ impl Solid {
 
     /// As far as it does not take too long; from there on pieces are not cut.
     fn coarse_pieces(&self) -> Vec<Piece> {
-        let mut cutter = Cutter::new(self, COARSEST, MOST_LOOKS);
+        let mut cutter = Cutter::new(self, COARSEST, MOST_COARSE_LOOKS);
         self.cut(&mut cutter, COARSEST, |_| true);
         self.sewn(cutter.pieces)
     }
@@ -231,6 +231,8 @@ const ON: f64 = 1e-11;
 const MOST_TRIANGLES: usize = 48_000;
 /// Levels of patches that are looked at: about a tenth of a second.
 const MOST_LOOKS: usize = 1_500_000;
+/// The same with the coarsest steps, for hundreds of leaves: up to three seconds.
+const MOST_COARSE_LOOKS: usize = 60_000_000;
 /// Of the way to a piece's middle, from where its corners' normals are seen.
 const ASIDE: f64 = 1e-6;
 /// Of unit normals: more alike ones are one.

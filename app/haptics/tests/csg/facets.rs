@@ -186,3 +186,19 @@ fn facets_of_many_leaves_are_bounded() {
     println!("{} triangles", facets.triangles.len());
     assert!((1000..200_000).contains(&facets.triangles.len()), "{}", facets.triangles.len());
 }
+
+/// More than is cut with fine steps: a box with 60 bores, whose cylinders reach far out of it.
+#[test]
+fn a_box_with_many_long_bores_is_as_large_as_the_box() {
+    let mut parts = vec![CsgPart::from(cuboid([0.1; 3]))];
+    for at in 0..60_i32 {
+        let [x, z] = [at % 8, at / 8].map(|step| 0.011 * f64::from(step) - 0.038);
+        parts.push(CsgPart::at(Cylinder::new(1e-3, 0.2).unwrap(), v(x, 0.0, z)));
+    }
+    let facets = built(&CsgTree::difference(parts)).facets();
+    assert!((size(&facets) - v(0.1, 0.1, 0.1)).amax() < 1e-6, "{}", size(&facets));
+    // Of a circle 12 chords leave 4.5 % out.
+    let bored = 60.0 * PI * 1e-6 * 0.1;
+    let missing = 1e-3 - volume_m3(&facets);
+    assert!((0.9..1.01).contains(&(missing / bored)), "{missing}");
+}

@@ -1,4 +1,4 @@
-//! Bytes that recordings of a scene take, by writing some rows into memory.
+//! The most bytes that recordings of a scene take, by writing some rows into memory in which everything moves.
 
 use crate::record::{About, McapFile, Opened, View};
 use crate::recording::Recording;
@@ -9,17 +9,6 @@ use io_driver::device::Extras;
 use rustix::fs::{MemfdFlags, memfd_create};
 use std::fs::File;
 use std::path::Path;
-use std::time::{Duration, Instant};
-
-/// A table and an MCAP of the same rows; `None`: it cannot be written.
-pub(super) struct Bytes {
-    csv: Option<Written<Recording>>,
-    mcap: Option<Written<McapFile>>,
-    /// The most rows of the table.
-    most: usize,
-    /// Time that is left for the MCAP.
-    left: Duration,
-}
 
 /// A recording, its file, and how long that was without rows.
 struct Written<R> {
@@ -29,56 +18,63 @@ struct Written<R> {
     rows: usize,
 }
 
-impl Bytes {
-    /// Nothing yet, of rows with so many bodies.
-    pub(super) fn new(rig: &Rig, entities: &[Entity], bodies: usize) -> Self {
-        let names = rig.names(&vec![Extras::default(); rig.device_count()]);
-        let period_ns = rig.period_ns;
-        let csv = in_memory().and_then(|(file, opened)| {
-            let mut recording = Recording::begin(opened, names.clone(), period_ns).ok()?;
-            recording.flush().ok()?;
-            Written::begin(recording, file)
-        });
-        let view = View::new(&rig.scene, entities, false);
-        let mcap = in_memory().and_then(|(file, opened)| {
-            let mut recording = McapFile::create(opened, names, period_ns, &About::default(), view).ok()?;
-            recording.flush().ok()?;
-            Written::begin(recording, file)
-        });
-        let most = (MOST_BODIES / bodies.max(1)).clamp(LEAST_ROWS, MOST_ROWS);
-        Self { csv, mcap, most, left: MCAP_BUDGET }
-    }
-
-    /// Takes in a row and its bodies, unless there are enough.
-    pub(super) fn add(&mut self, row: &Row, bodies: &[BodyRow]) {
-        if let Some(csv) = self.csv.as_mut().filter(|csv| csv.rows < self.most) {
-            csv.rows += 1;
-            if csv.recording.append(row, bodies).is_err() {
-                self.csv = None;
-            }
+/// Bytes of a row in the mean, of a table and of an MCAP, where all that moves does so; `None` where that cannot be written.
+pub(super) fn most_bytes_a_row(rig: &Rig, entities: &[Entity], mut bodies: Vec<BodyRow>) -> [Option<f64>; 2] {
+    let names = rig.names(&vec![Extras::default(); rig.device_count()]);
+    let (period_ns, rows) = (rig.period_ns, (MOST_BODIES / bodies.len().max(1)).clamp(LEAST_ROWS, MOST_ROWS));
+    let mut csv = in_memory().and_then(|(file, opened)| {
+        let mut recording = Recording::begin(opened, names.clone(), period_ns).ok()?;
+        recording.flush().ok()?;
+        Written::begin(recording, file)
+    });
+    let view = View::new(&rig.scene, entities, false);
+    let mut mcap = in_memory().and_then(|(file, opened)| {
+        let mut recording = McapFile::create(opened, names, period_ns, &About::default(), view).ok()?;
+        recording.flush().ok()?;
+        Written::begin(recording, file)
+    });
+    let mut row = Row::empty();
+    let mut digits = Digits(1);
+    for run_tick in 0..rows as u64 {
+        row.run_tick = run_tick;
+        for finger in row.fingers.iter_mut().take(rig.scene.fingers.len()) {
+            let vectors = [&mut finger.hip, &mut finger.god_object, &mut finger.velocity];
+            vectors.into_iter().for_each(|vector| digits.fill(vector.iter_mut()));
+            digits.fill(finger.force_on_user.iter_mut().chain(finger.applied_on_user.iter_mut()));
         }
-        let has_time = !self.left.is_zero();
-        if let Some(mcap) = self.mcap.as_mut().filter(|mcap| has_time && mcap.rows < MOST_ROWS) {
-            let begin = Instant::now();
-            mcap.rows += 1;
-            if mcap.recording.append(row, bodies, &[]).is_err() {
-                self.mcap = None;
-            }
-            self.left = self.left.saturating_sub(begin.elapsed());
+        for body in &mut bodies {
+            digits.fill(body.position.iter_mut().chain(body.velocity.iter_mut()));
+            digits.fill(body.orientation.coords.iter_mut().chain(body.angular_velocity.iter_mut()));
         }
+        csv = csv.and_then(|mut csv| {
+            csv.recording.append(&row, &bodies).ok()?;
+            Some(Written { rows: csv.rows + 1, ..csv })
+        });
+        mcap = mcap.and_then(|mut mcap| {
+            mcap.recording.append(&row, &bodies, &[]).ok()?;
+            Some(Written { rows: mcap.rows + 1, ..mcap })
+        });
     }
+    let csv = csv.and_then(|mut csv| {
+        csv.recording.flush().ok()?;
+        csv.of_row()
+    });
+    let mcap = mcap.and_then(|mut mcap| {
+        mcap.recording.flush().ok()?;
+        mcap.of_row()
+    });
+    [csv, mcap]
+}
 
-    /// In the mean, of the table and of the MCAP; `None` where that could not be written.
-    pub(super) fn a_row(mut self) -> [Option<f64>; 2] {
-        let csv = self.csv.as_mut().and_then(|csv| {
-            csv.recording.flush().ok()?;
-            csv.of_row()
-        });
-        let mcap = self.mcap.as_mut().and_then(|mcap| {
-            mcap.recording.flush().ok()?;
-            mcap.of_row()
-        });
-        [csv, mcap]
+/// Numbers with all of their digits.
+struct Digits(u64);
+
+impl Digits {
+    fn fill<'n>(&mut self, numbers: impl Iterator<Item = &'n mut f64>) {
+        for number in numbers {
+            self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+            *number = 0.5 - (self.0 >> 11) as f64 / (1_u64 << 53) as f64;
+        }
     }
 }
 
@@ -102,9 +98,8 @@ fn in_memory() -> Option<(File, Opened)> {
     Some((file, opened))
 }
 
-/// Rows of a table with more bodies are fewer; those of an MCAP tell what has changed.
-const MOST_BODIES: usize = 100_000;
-const LEAST_ROWS: usize = 2;
-/// An MCAP has a new beginning after as many.
-const MOST_ROWS: usize = 500;
-const MCAP_BUDGET: Duration = Duration::from_millis(150);
+/// Of more bodies rows are fewer.
+const MOST_BODIES: usize = 50_000;
+/// Pictures are in every twentieth at 1 kHz.
+const LEAST_ROWS: usize = 4;
+const MOST_ROWS: usize = 400;
