@@ -32,7 +32,7 @@ pub struct Names {
     pub spaces: Option<Vec<String>>,
     /// Whether it is told in which list the bodies are: where there are two.
     pub lists: bool,
-    /// Whether it is told as of when bodies stand where they do.
+    /// True if it is told as of when bodies stand where they do.
     pub as_of: bool,
 }
 

@@ -56,7 +56,7 @@ impl Moments {
         row.run_tick as f64 * self.period_s
     }
 
-    /// How long before a tick a body stood where it is in the row (ms).
+    /// Time since a body stood where it is in a tick's row (ms).
     pub fn age_ms(&self, row: &Row, body: &BodyRow) -> u64 {
         let ticks = body.as_of.map_or(0, |as_of| row.run_tick.saturating_sub(as_of));
         (1e3 * ticks as f64 * self.period_s).round() as u64

@@ -197,7 +197,7 @@ fn has_reader(path: &Path) -> bool {
     path.metadata().is_ok_and(|found| !found.is_file())
 }
 
-/// What became of a recording.
+/// The report's line of a recording.
 pub(crate) fn recording_line(recorded: &Recorded) -> String {
     let Recorded { path, rows, unit, lost, is_left_behind, failure, is_as_before } = recorded;
     let who = if has_reader(path) { "its reader" } else { "the disk" };

@@ -90,7 +90,7 @@ pub struct Desk {
     coming: VecDeque<Coming>,
     /// Worlds that are made when there is room for them.
     later: VecDeque<Wanted>,
-    /// Who makes them, where time does not wait.
+    /// Their maker, where time does not wait.
     maker: Option<WorldMaker>,
     /// The rig as it is now, once for all worlds to come that have it.
     shared_rig: Option<Arc<Rig>>,

@@ -69,7 +69,7 @@ impl OrderSender {
         self.lane(lane).is_full()
     }
 
-    /// How many more worlds may be made before their time.
+    /// Number of worlds that may still be made before their time.
     pub fn rooms_for_worlds(&self) -> usize {
         self.worlds.slots()
     }

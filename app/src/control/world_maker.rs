@@ -93,7 +93,7 @@ impl WorldMaker {
         Ok(Self { wanted, made, under_way: 0 })
     }
 
-    /// How many have been asked for and not been taken.
+    /// Number that has been asked for and not been taken.
     pub(super) fn under_way(&self) -> usize {
         self.under_way
     }

@@ -280,7 +280,7 @@ impl Recorder {
         }
     }
 
-    /// Whether it has got a row.
+    /// True once it has got a row.
     pub fn has_begun(&self) -> bool {
         self.sent > 0
     }

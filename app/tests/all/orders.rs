@@ -490,7 +490,7 @@ fn too_much_on_what_is_to_be_moved_is_told_and_left_where_it_is() {
     assert_eq!(fast.step_mut().entities()[0].X_WB.translation.vector, Vector3::new(0.0, -0.01, 0.0));
 }
 
-/// Where time does not wait a thread of its own makes worlds, but for the first two.
+/// A thread of its own makes worlds where time does not wait, but for the first two.
 #[test]
 fn worlds_that_somebody_else_makes_come_in_the_order_of_the_script() {
     let place = Place::new();

@@ -67,7 +67,7 @@ impl Contacts {
     }
 }
 
-/// Which list has an entity, and how long ago it stood where it is shown, if that is longer than nobody sees.
+/// The list that has an entity, and how long ago that stood where it is shown, if that is longer than nobody sees.
 pub fn list(known: &Known, entity: usize, status: &Status) -> Cow<'static, str> {
     match (known.mass, status.slow_ms.get(entity).copied().flatten()) {
         (None, _) => "fixed".into(),
@@ -77,7 +77,7 @@ pub fn list(known: &Known, entity: usize, status: &Status) -> Cow<'static, str> 
     }
 }
 
-/// What is younger is as good as new (ms): a frame of a display.
+/// Age below which a place is as good as new (ms): a frame of a display.
 const SEEN_MS: u64 = 16;
 
 #[cfg(test)]

@@ -60,7 +60,7 @@ pub struct FastList {
     held: Vec<u32>,
     /// Bodies that an order waits for.
     fetched: Vec<u32>,
-    /// Where fingers are.
+    /// Places of the fingers.
     hips: Hips,
     glides: Glides,
     /// Of each body, the run's tick as of which it stands where it is here, and whether it rests there.

@@ -1,4 +1,4 @@
-//! Where the fast side has what is in the slow list: told from there, the nearest to fingers first, and without leaps.
+//! Places of what is in the slow list, as the fast side has them: told from there, the nearest to fingers first, and without leaps.
 //!
 //! Problem: a tick takes in a bounded number of places, and a river of things has more of them than that. What a finger is
 //! near has to stand where it is all the same, and must not leap while somebody looks.
@@ -14,7 +14,7 @@ use nalgebra::Vector3;
 use physics::{Body, Manipulation, Standing};
 use rtrb::{Consumer, Producer, RingBuffer};
 
-/// What is nearer to a finger than this is told first, and does not leap \[m\].
+/// Distance from a finger within which things are told first, and do not leap \[m\].
 const NEAR_M: f64 = 0.1;
 /// In a tick a thing near a finger goes no farther than this towards where it is, or than twice its own way \[m\].
 const MOST_LEAP_M: f64 = 1.5e-3;
@@ -38,11 +38,11 @@ pub(super) const MOST_HIPS: usize = 64;
 /// So many fingers are told of.
 pub(super) const MOST_FINGERS: usize = crate::MAX_DEVICES;
 
-/// Where a body stands that is in the slow list, and how it moves.
+/// Place of a body that is in the slow list, and its motion.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Stand {
     pub(super) body: u32,
-    /// How often it had come to the slow list by then: an old one must not place a body that was away meanwhile.
+    /// Number of times that it had come to the slow list by then: an old one must not place a body that was away meanwhile.
     pub(super) stay: u32,
     /// The tick of the run that begins with it there.
     pub(super) as_of: u64,
@@ -71,7 +71,7 @@ pub(super) fn take([near, far]: &mut Stands<Consumer<Stand>>) -> impl Iterator<I
     std::iter::from_fn(next).take(STANDS_A_TICK)
 }
 
-/// Where the fingers are in a tick of the run.
+/// Places of the fingers in a tick of the run.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Hips {
     pub(super) run_tick: u64,
@@ -235,7 +235,7 @@ fn is_seen(to: &Stand, now: &Body, hips: &Hips) -> bool {
     hips.are_near(&to.state.centre_W) || hips.are_near(&now.centre_W)
 }
 
-/// How much of its way to another place a body goes in a tick; 1: it is there then.
+/// Share of its way to another place that a body goes in a tick; 1: it is there then.
 fn share(now: &Body, to: &Body, dt_s: f64) -> f64 {
     let way_m = (to.centre_W - now.centre_W).norm();
     let most_m = MOST_LEAP_M.max(2.0 * to.velocity_W.norm() * dt_s);

@@ -22,7 +22,7 @@ pub struct SlowList {
     fetched: Vec<usize>,
     island: Vec<usize>,
     untold: Untold,
-    /// Where fingers were when this turn began.
+    /// Places of the fingers when this turn began.
     hips: Hips,
     stepped: u64,
     /// Time that is left of this turn (s).
