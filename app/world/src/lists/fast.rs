@@ -302,7 +302,8 @@ impl FastList {
         if goes {
             for &body in &island {
                 self.stays[body] += 1;
-                self.as_of[body] = (self.hips.run_tick + 1, false);
+                let rests = manipulation.standing(body) == Standing::Asleep;
+                self.as_of[body] = (self.hips.run_tick + 1, rests);
             }
             self.here.retain(|body| island.binary_search(&(*body as usize)).is_err());
             self.handed.went += island.len() as u64;

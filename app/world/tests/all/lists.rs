@@ -193,6 +193,10 @@ fn a_stack_that_changes_lists_does_not_twitch() {
         }
     }
     assert!(world.lists.hand_over.handed().came >= 20);
+    // What was given away asleep rests: it is as new as any tick.
+    (0..50).for_each(|_| world.step(&[], true));
+    assert!((0..2).all(|body| world.standings(body)[0].is_away()));
+    assert_eq!([0, 1].map(|body| world.lists.hand_over.as_of(body)), [None; 2]);
 }
 
 #[test]
