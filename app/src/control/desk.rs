@@ -1,7 +1,7 @@
 //! The slow side of orders: reads them, checks them against the scene that will run then, makes what they need, sends them.
 //!
 //! Model: a script is sent as a whole before the run begins, each order with its tick: so it plays the same on every clock. Only
-//! the worlds that it brings are made one after the other ([`WorldMaker`]): two are there before their time, and clocks that can
+//! the worlds that it brings are made one after the other (`world_maker.rs`): two are there before their time, and clocks that can
 //! wait wait for them.
 //! The standard input is read by a thread of its own; its orders are for the next tick.
 
