@@ -1,5 +1,6 @@
 //! Runs on the virtual clock, in one thread.
 
+use patience::prelude::*;
 use phantom3::fast_loop::{FastLoop, WhenFull};
 use phantom3::outcome::Stop;
 use phantom3::progress::Progress;
@@ -20,8 +21,7 @@ fn a_run_goes_on_though_few_rows_fit_into_its_queue() {
     for places in [2, 3, 39] {
         // One that waits for itself would wait for ever.
         let run = std::thread::spawn(move || run(places));
-        patience::until(&format!("the end of a run with {places} places"), || run.is_finished());
-        run.join().expect("no panic");
+        run.bounded_join().unwrap_or_else(|_| panic!("a run with {places} places"));
     }
 }
 
