@@ -375,6 +375,7 @@ impl FastLoop {
             std::mem::swap(&mut self.displaced, &mut other.displaced);
         }
         self.displaced.begin_anew(self.step.entities());
+        self.step.begin_at(run_tick);
         // Room for all of them was made with the world.
         self.pending_bodies.extend((0..).zip(self.step.bodies().iter().copied()));
         if let Some(control) = &mut self.control {

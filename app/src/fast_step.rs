@@ -172,6 +172,11 @@ impl FastStep {
         self.objects.manipulation().is_body(entity)
     }
 
+    /// Its world takes over in this tick of the run.
+    pub fn begin_at(&mut self, run_tick: u64) {
+        self.objects.begin_at(run_tick);
+    }
+
     /// All entities.
     pub fn entities(&self) -> &[Entity] {
         &self.entities

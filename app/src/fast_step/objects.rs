@@ -282,6 +282,14 @@ impl Objects {
         self.note_changed();
     }
 
+    /// The world begins in this tick of the run.
+    pub(super) fn begin_at(&mut self, run_tick: u64) {
+        if let Some(lists) = &mut self.lists {
+            lists.hand_over.begin_at(run_tick);
+            self.rows.iter_mut().for_each(|row| row.as_of = row.as_of.map(|_| run_tick));
+        }
+    }
+
     fn note_all(&mut self) {
         self.manipulation.forget_changes();
         self.note_changed();

@@ -148,6 +148,11 @@ impl FastList {
         }
     }
 
+    /// The world begins in this tick of the run, and was never before.
+    pub fn begin_at(&mut self, run_tick: u64) {
+        self.as_of.fill((run_tick, false));
+    }
+
     /// The tick of the run as of which a body that is in the slow list stands where it is here, unless it rests.
     pub fn as_of(&self, body: usize) -> Option<u64> {
         let (tick, rests) = self.as_of[body];
