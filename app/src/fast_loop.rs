@@ -325,6 +325,7 @@ impl FastLoop {
         self.step.meet_driver(driver.abi_minor(), driver.ramp_in_ticks());
         let begin = Instant::now();
         self.step.step_at_most(self.pace.map_or(usize::MAX, |pace| pace.bodies()));
+        self.step.count_from(self.offset_ticks.unwrap_or(0));
         self.step.step(&self.frame, &mut self.command, &mut self.row);
         commander.publish(&self.command, driver);
         let took_ns = begin.elapsed().saturating_sub(self.step.slow_turn()).as_nanos() as u64;

@@ -58,6 +58,8 @@ pub struct FastStep {
     /// Of each finger.
     finger_effects: Vec<FingerEffects>,
     period_s: f64,
+    /// Ticks of the run before those that frames count.
+    offset_ticks: u64,
     last_tick: Option<u64>,
     driver_estimates: bool,
     /// Where each finger's tip was in its device's base (m), if that was known.
@@ -97,6 +99,7 @@ impl FastStep {
             effects: Effects::default(),
             finger_effects: Vec::new(),
             period_s,
+            offset_ticks: 0,
             last_tick: None,
             driver_estimates: false,
             tips_D,
@@ -170,6 +173,11 @@ impl FastStep {
     /// Whether an entity moves.
     pub fn is_body(&self, entity: usize) -> bool {
         self.objects.manipulation().is_body(entity)
+    }
+
+    /// Frames count their ticks from here on in the run: of a driver that was restarted.
+    pub fn count_from(&mut self, offset_ticks: u64) {
+        self.offset_ticks = offset_ticks;
     }
 
     /// Its world takes over in this tick of the run.
@@ -311,7 +319,8 @@ impl FastStep {
             self.fingers.iter().zip(&self.tips_D).filter_map(|(finger, last_D)| {
                 finger.reach(devices.get(finger.device)?, last_D.as_ref(), dt_s)
             });
-        self.objects.reach(&mut self.entities, reaches, row.run_tick);
+        let run_tick = row.run_tick.saturating_add(self.offset_ticks);
+        self.objects.reach(&mut self.entities, reaches, run_tick);
         let world = World { entities: &self.entities, doors: &self.doors, objects: &self.objects };
         let mut all_carried_W = [Vector3::zeros(); MAX_DEVICES];
         let moved = self.tips_D.iter_mut().zip(&mut self.carried_W).zip(&mut all_carried_W);

@@ -18,7 +18,8 @@ use std::sync::atomic::{AtomicU64, Ordering};
 /// Rows that may wait: eight seconds at 1 kHz, so that a slow disk costs nothing.
 pub const ROW_QUEUE: usize = 8192;
 
-/// Changed bodies that may wait, of all rows together (180 MB); where more than 128 change in each row, fewer rows can.
+/// Changed bodies that may wait, of all rows together (180 MB); where more than 128 change in each row, or of
+/// [`MANY`] 32, fewer rows can.
 const BODY_QUEUE: usize = 1 << 20;
 /// The same of a world with more than so many, of which few change in a tick.
 const MANY: usize = 4096;

@@ -312,6 +312,24 @@ fn what_flies_by_near_a_finger_does_not_leap_and_tells_as_of_when_it_is_there() 
     assert!(oldest[0] <= 19 && (20..=60).contains(&oldest[1]), "{oldest:?}");
 }
 
+/// As after a driver was restarted, whose frames count from the beginning.
+#[test]
+fn places_are_as_of_ticks_of_the_run_and_not_of_a_driver() {
+    let ball = "[[entity]]\nname = \"ball\"\nshape = { kind = \"sphere\", radius_m = 0.01 }\nposition_m = [0, 0, 0]\n\
+                velocity_m_s = [1, 0, 0]\nmass_kg = 0.1\nstiffness_n_per_m = 500\n";
+    let mut run = Run::new(&format!("{ALL_SLOW}{FLOATING}{ball}"));
+    for offset_ticks in [0, 100] {
+        run.step.count_from(offset_ticks);
+        run.tick = 0;
+        for tick in 0..100 {
+            run.tick([9.0, 0.0, 0.0], true);
+            let as_of = run.step.bodies()[0].as_of.expect("it does not rest");
+            assert!((offset_ticks + tick).abs_diff(as_of) <= 11, "tick {tick} from {offset_ticks}: {as_of}");
+        }
+    }
+    assert!((run.step.bodies()[0].position.x - 0.19).abs() < 1e-9, "{}", run.step.bodies()[0].position.x);
+}
+
 #[test]
 fn whenever_a_run_ends_each_body_is_in_one_list() {
     let grid = "grid = { count = [10, 1, 6], spacing_m = [0.1, 1, 0.1] }";

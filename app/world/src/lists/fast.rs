@@ -171,7 +171,8 @@ impl FastList {
         self.tick += 1;
         self.soon.clear();
         self.around.clear();
-        self.hips.clear(run_tick);
+        // A driver that was restarted counts from the beginning: no place is to be taken for an older one.
+        self.hips.clear(run_tick.max(self.hips.run_tick));
         for finger in fingers.take(MOST_FINGERS).filter(is_finite) {
             self.hips.push(finger.hip_W);
             let now = Aabb::of_ball(&finger.hip_W, finger.radius_m);

@@ -1,12 +1,13 @@
-//! Places of what is in the slow list, as the fast side has them: told from there, the nearest to fingers first, and without leaps.
+//! Places of what is in the slow list, as the fast side has them: what is near fingers is told first, and does not leap.
 //!
 //! Problem: a tick takes in a bounded number of places, and a river of things has more of them than that. What a finger is
 //! near has to stand where it is all the same, and must not leap while somebody looks.
 //!
-//! Model: the slow side knows where fingers were lately ([`Hips`]). What is near a finger has a queue of its own ([`Stands`]),
-//! of which the fast side takes in most of what a tick may; so no place of it waits behind others, nor others for ever. In each turn the slow side tells as many places as
-//! there is room for ([`Untold`]), by the way since each was told last; so nobody waits for ever. On the fast side what is near a finger goes the way to its new
-//! place within a few ticks ([`Glides`]), no faster in a tick than [`MOST_LEAP_M`] or twice its own speed.
+//! Model: the slow side knows where fingers were lately ([`Hips`]). What is near a finger has a queue of its own ([`Stands`]), of
+//! which the fast side takes in most of what a tick may: no place of it waits behind others, nor others for ever. In each turn
+//! the slow side tells as many places as there is room for ([`Untold`]), first those with the longest way since they were told.
+//! On the fast side what is near a finger goes to its new place within a few ticks ([`Glides`]), no faster in a tick than
+//! [`MOST_LEAP_M`] or twice its own speed.
 //! Invariants: the fast side's part allocates nothing and is bounded in each tick.
 
 use haptics::Entity;

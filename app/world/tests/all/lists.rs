@@ -215,6 +215,27 @@ fn a_slow_side_that_stalls_leaves_its_bodies_standing_where_they_were() {
     assert!(world.lists.hand_over.here() >= 2 && handed.waits.most_ticks() >= 5000, "{handed:?}");
 }
 
+/// As a driver that was restarted: it begins anew, and the slow list goes on.
+#[test]
+fn where_the_count_of_ticks_begins_anew_slow_things_are_seen_going_on() {
+    let (mut entities, bodies) = falling();
+    let Lists { mut fast, mut hand_over, mut slow } =
+        Lists::new(&entities, &bodies, Settings::default(), STRICT).unwrap();
+    let mut y = 0.5;
+    for tick in 0..300_u64 {
+        hand_over.begin_tick(&mut fast, &mut entities, std::iter::empty(), (tick % 150, DT));
+        fast.step(&mut entities, &mut [], DT);
+        hand_over.end_tick(&mut fast, &entities);
+        slow.turn(1, DT);
+        let now = entities[2].X_WB.translation.vector.y;
+        // Of what was given away in the first tick the first places come in the next ones.
+        assert!(tick < 10 || now < y, "tick {tick}: {now}");
+        y = now;
+    }
+    let fallen = 0.5 * 9.81 * 0.299_f64.powi(2);
+    assert!((0.5 - y - fallen).abs() < 9.81 * 0.3 * 5.0 * DT, "{y}");
+}
+
 /// A cube on the floor, and one that falls on it from half a metre.
 fn falling() -> (Vec<Entity>, Vec<(usize, Body)>) {
     let floor = Plane::new(Vector3::y(), 0.0).unwrap();
