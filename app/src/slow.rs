@@ -341,7 +341,7 @@ mod tests {
     use super::*;
     use crate::columns::Names;
     use crate::fast_loop::WhenFull;
-    use crate::record::{Backpressure, Opened, RecordFile};
+    use crate::record::{About, Backpressure, McapFile, Opened, RecordFile, View};
     use crate::recording::Recording;
     use crate::row_queue::{RowSender, row_queue_of};
     use rt_core::signals::StopSignals;
@@ -358,16 +358,25 @@ mod tests {
     #[test]
     fn rows_that_found_no_room_on_their_way_are_missing_in_the_recordings() {
         let directory = tempfile::tempdir().expect("a directory");
-        let start = |name: &str| {
+        let start = |name: &str, begin: fn(Opened) -> RecordFile| {
             let path = directory.path().join(name);
-            let opened = Opened::recording(&path).expect("opened");
-            let table = Recording::begin(opened, Names::default(), 1_000_000).expect("a table");
+            let file = begin(Opened::recording(&path).expect("opened"));
             let how = Backpressure::new(WhenFull::Drop, &StopSignals::default());
-            Recorder::start(&path, RecordFile::Csv(Box::new(table)), 0, 1_000_000, how).expect("a thread")
+            Recorder::start(&path, file, 0, 1_000_000, how).expect("a thread")
+        };
+        let table = |file| {
+            let table = Recording::begin(file, Names::default(), 1_000_000);
+            RecordFile::Csv(Box::new(table.expect("a table")))
+        };
+        let mcap = |file| {
+            let scene = world::Scene::parse("[[finger]]\n", Path::new("scene.toml")).expect("a scene");
+            let view = View::new(&scene, &[], false);
+            let file = McapFile::create(file, Names::default(), 1_000_000, &About::default(), view);
+            RecordFile::Mcap(Box::new(file.expect("a file")))
         };
         let (mut sender, rows) = row_queue_of(4, 0, 0);
         let hub = Hub::new(vec![event_queue(4).1]);
-        let mut slow = SlowSide::new(rows, hub, vec![start("a.csv"), start("b.csv")]);
+        let mut slow = SlowSide::new(rows, hub, vec![start("a.csv", table), start("b.mcap", mcap)]);
         send(&mut sender, 0..4);
         slow.step();
         // Seven find no room, and three of them no row behind them.
@@ -377,5 +386,10 @@ mod tests {
         for recorded in slow.finish().recordings {
             assert_eq!((recorded.rows, recorded.lost), (12, 7));
         }
+        let bytes = std::fs::read(directory.path().join("b.mcap")).expect("there");
+        let all = mcap::MessageStream::new(&bytes).expect("sound").map(|message| message.expect("sound"));
+        let lost = all.filter(|message| message.channel.topic == "/events");
+        // Before tick 12, and behind the last one.
+        assert_eq!(lost.map(|message| message.log_time / 1_000_000).collect::<Vec<_>>(), [12, 15]);
     }
 }
