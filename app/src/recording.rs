@@ -11,6 +11,7 @@ use crate::record::{Content, ContentState, Opened, OtherContent, WholeLines};
 use crate::row::{BodyRow, Row};
 use io_driver::device::run_time_s;
 use std::fmt::Write as _;
+use std::fs::File;
 use std::io;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -222,6 +223,14 @@ impl Recording {
     /// Content of the file, to be looked at from another thread.
     pub(crate) fn content(&self) -> Arc<ContentState> {
         self.lines.content()
+    }
+
+    /// Another handle of the file ([`Opened::second_handle`]).
+    ///
+    /// # Errors
+    /// As there.
+    pub(crate) fn second_handle(&self) -> io::Result<Option<File>> {
+        self.lines.second_handle()
     }
 
     /// Rows in the file.

@@ -41,8 +41,10 @@ impl BroadPhase {
     /// Where the entities are now.
     pub fn new(entities: &[Entity]) -> Self {
         let mut tree = Tree::with_capacity(entities.len());
-        let put = |(index, entity)| tree.insert(index as u32, Aabb::of_entity(entity)?.grown(FAT_M));
-        let leaves: Box<[_]> = entities.iter().enumerate().map(put).collect();
+        let around = |(index, entity)| Some((index, Aabb::of_entity(entity)?.grown(FAT_M)));
+        let mut boxes: Vec<(u32, Aabb)> = (0..).zip(entities).filter_map(around).collect();
+        let mut leaves: Box<[Option<u32>]> = vec![None; entities.len()].into();
+        tree.fill(&mut boxes, |index, leaf| leaves[index as usize] = Some(leaf));
         let is_boundless = |index: &u32| leaves[*index as usize].is_none();
         let boundless = (0..entities.len() as u32).filter(is_boundless).collect();
         Self { tree, leaves, boundless, version: 0 }

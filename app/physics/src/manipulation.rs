@@ -129,7 +129,7 @@ const FEW_PAIRS: usize = 512;
 /// The most touches of fingers in a tick.
 const MAX_TOUCHES: usize = 64;
 /// Contact points between entities that have room at first, or so many of each body if that is more; until there is
-/// [more](room) others are left out, and counted. A quarter is for those with what does not move: nothing falls through a floor
+/// [more](room) others are left out, and counted; who has no deadlines makes room as they come. A quarter is for those with what does not move: nothing falls through a floor
 /// for want of room.
 const ROWS: usize = 8192;
 const ROWS_OF_BODY: usize = 8;
@@ -201,9 +201,9 @@ impl Manipulation {
         } else {
             Pairs::growing(at_first.min(FEW_PAIRS), most_pairs)
         };
+        let rows_of_bodies = if has_deadlines { ROWS_OF_BODY * here } else { 0 };
         let rows = RowCounts {
-            of_pairs: (at_first.next_multiple_of(pairs::CHUNK) * MAX_POINTS)
-                .min(ROWS.max(ROWS_OF_BODY * here)),
+            of_pairs: (at_first.next_multiple_of(pairs::CHUNK) * MAX_POINTS).min(ROWS.max(rows_of_bodies)),
             of_fingers: MAX_TOUCHES + MAX_PULLS,
             bodies: count,
         };
@@ -251,7 +251,9 @@ impl Manipulation {
             }
             made.make_room(entities);
             let of_pairs = made.pairs.keys().map(|key| likely_points(key, entities, &made.roster)).sum();
-            if of_pairs > made.room.counts.of_pairs {
+            if !has_deadlines {
+                made.room.rows.reserve_exact(of_pairs);
+            } else if of_pairs > made.room.counts.of_pairs {
                 made.room = Box::new(RowRoom::new(RowCounts { of_pairs, ..made.room.counts }));
             }
         } else {

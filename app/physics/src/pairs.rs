@@ -117,6 +117,11 @@ impl Pairs {
         Self { grows: true, ..Self::with_capacity(at_first, most) }
     }
 
+    /// Room is made when it is needed, here and for contact points.
+    pub(crate) fn grow(&self) -> bool {
+        self.grows
+    }
+
     /// A place for one more; of those that grow there is one.
     fn place(&mut self, is_full: bool) -> Option<u32> {
         if self.grows && self.unused.is_empty() {

@@ -93,6 +93,11 @@ impl Solver {
         }
     }
 
+    /// Takes so many rows from now on, for which it may allocate.
+    pub(crate) fn make_room_for(&mut self, rows: usize) {
+        self.room[0] = self.room[0].max(rows);
+    }
+
     /// Tells what velocity gravity has given to all bodies in the tick to come \[m/s\]: what rests,
     /// or goes on as it did, is found sooner.
     pub(crate) fn expect(&mut self, fall_W: &Vector3<f64>) {

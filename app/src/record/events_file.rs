@@ -9,6 +9,7 @@ use crate::book::Book;
 use crate::columns::Names;
 use crate::recording::RecordingError;
 use io_driver::device::run_time_s;
+use std::fs::File;
 use std::io;
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -60,6 +61,14 @@ impl EventsFile {
         self.lines.content()
     }
 
+    /// Another handle of the file ([`Opened::second_handle`]).
+    ///
+    /// # Errors
+    /// As there.
+    pub(super) fn second_handle(&self) -> io::Result<Option<File>> {
+        self.lines.second_handle()
+    }
+
     /// Appends an event.
     ///
     /// # Errors
@@ -82,12 +91,12 @@ impl EventsFile {
         self.lines.flush().map_err(|source| self.failed(source))
     }
 
-    /// Writes the rest; says how many events there are.
+    /// Writes the rest out to the disk itself; says how many events there are.
     ///
     /// # Errors
     /// If that fails, or nobody would find it.
     pub fn finish(mut self) -> Result<u64, RecordingError> {
-        self.lines.keep().map_err(|source| self.failed(source))?;
+        self.lines.keep().and_then(|()| self.lines.sync()).map_err(|source| self.failed(source))?;
         let rows = self.rows();
         if self.lines.is_removed() {
             Err(RecordingError::Removed { file: self.path, rows }.of_events())

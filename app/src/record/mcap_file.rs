@@ -39,6 +39,7 @@ use mcap::write::NoSeek;
 use mcap::{Attachment, Compression, McapError, WriteOptions, Writer};
 use std::borrow::Cow;
 use std::collections::BTreeMap;
+use std::fs::File;
 use std::io::{self, Seek, SeekFrom, Write};
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -47,12 +48,10 @@ use world::events::{Event, Facts, Kind};
 
 /// A chunk has so much of the run (ns): what a killed process loses at most, besides what waits for the disk.
 const CHUNK_NS: u64 = 500_000_000;
-/// Or so many bytes, with many objects.
+/// Or so many bytes, besides its first tick, which has all objects.
 const CHUNK_BYTES: usize = 4 << 20;
 /// More than this no chunk has: readers of ours take twice as much.
 pub(super) const MOST_CHUNK_BYTES: usize = 32 << 20;
-/// Most bytes of a body in a tick.
-const MOST_BODY_BYTES: usize = 256;
 /// Most bytes of a message besides its content.
 const MESSAGE_HEAD_BYTES: usize = 32;
 /// Between two pictures (ns).
@@ -72,6 +71,8 @@ pub(super) const ORDER_TOPIC: &str = "/orders";
 /// An MCAP file being written.
 pub struct McapFile {
     writer: Writer<NoSeek<WholeWrites>>,
+    /// Another handle of the file, until somebody takes it.
+    second_handle: Option<File>,
     beginning: Arc<Beginning>,
     content: Arc<ContentState>,
     path: PathBuf,
@@ -89,8 +90,9 @@ pub struct McapFile {
     shown_bodies: Vec<BodyRow>,
     /// Things that are no bodies and have been moved, as they were told last.
     last_placed: Vec<Placed>,
-    /// What the chunk has, and its first tick.
+    /// Length of what the chunk has, and of what in it is of all objects at once; and its first tick.
     chunk_bytes: usize,
+    chunk_of_all: usize,
     chunk_rows: u64,
     chunk_began: u64,
     next_picture: u64,
@@ -150,6 +152,7 @@ impl McapFile {
         let path = file.path().to_owned();
         let failed = |error| RecordingError::Create { file: path.clone(), source: into_io(error) };
         let (may_wait, content) = (file.may_wait(), file.content());
+        let second_handle = file.second_handle().map_err(|error| failed(error.into()))?;
         let beginning = Arc::new(Beginning::default());
         let writes = WholeWrites::new(file, Arc::clone(&beginning));
         let mut writer = options().create(NoSeek::new(writes)).map_err(failed)?;
@@ -159,6 +162,7 @@ impl McapFile {
         }
         let mut file = Self {
             writer,
+            second_handle,
             beginning,
             content,
             path: path.clone(),
@@ -174,6 +178,7 @@ impl McapFile {
             shown_bodies: Vec::new(),
             last_placed: Vec::new(),
             chunk_bytes: 0,
+            chunk_of_all: 0,
             chunk_rows: 0,
             chunk_began: 0,
             next_picture: 0,
@@ -227,6 +232,11 @@ impl McapFile {
         Arc::clone(&self.content)
     }
 
+    /// Another handle of the file ([`Opened::second_handle`]), once.
+    pub(super) fn take_second_handle(&mut self) -> Option<File> {
+        self.second_handle.take()
+    }
+
     /// No row has come, and the file has its earlier content.
     pub fn is_as_before(&self) -> bool {
         let Beginning { has_content, has_rows, .. } = &*self.beginning;
@@ -241,7 +251,8 @@ impl McapFile {
         self.beginning.has_rows.store(true, Ordering::Relaxed);
         if self.chunk_rows == 0 {
             self.chunk_began = row.run_tick;
-        } else if self.chunk_bytes > CHUNK_BYTES || self.time_ns(row.run_tick - self.chunk_began) >= CHUNK_NS
+        } else if self.chunk_bytes - self.chunk_of_all > CHUNK_BYTES
+            || self.time_ns(row.run_tick - self.chunk_began) >= CHUNK_NS
         {
             self.flush()?;
             self.chunk_began = row.run_tick;
@@ -265,7 +276,7 @@ impl McapFile {
         self.writer.flush()?;
         self.rows += self.chunk_rows;
         self.last_tick = self.last_in_chunk;
-        (self.chunk_rows, self.chunk_bytes) = (0, 0);
+        (self.chunk_rows, self.chunk_bytes, self.chunk_of_all) = (0, 0, 0);
         (self.chunk_has_all, self.chunk_shows_all) = (false, false);
         Ok(())
     }
@@ -396,12 +407,17 @@ impl McapFile {
     fn put_row(&mut self, row: &Row, bodies: &[BodyRow], placed: &[Placed]) -> Result<(), McapError> {
         let mut message = std::mem::take(&mut self.message);
         message.clear();
-        if self.chunk_bytes + MOST_BODY_BYTES * bodies.len() > MOST_CHUNK_BYTES {
-            // Or this tick might be the first of another chunk, without all that has not changed.
-            self.end_chunk()?;
-        }
         let before = self.chunk_has_all.then_some(&self.last_bodies[..]);
         tick::write(&mut message, row, (bodies, before), &self.names, self.period_ns);
+        if before.is_some() && !self.has_room_for(&message) {
+            // Or this tick would be the first of another chunk, without all that has not changed.
+            self.end_chunk()?;
+            message.clear();
+            tick::write(&mut message, row, (bodies, None), &self.names, self.period_ns);
+        }
+        if !self.chunk_has_all {
+            self.chunk_of_all += message.bytes().len();
+        }
         self.chunk_has_all = true;
         if bodies.len() > tick::ALWAYS {
             self.last_bodies.clear();
@@ -412,11 +428,16 @@ impl McapFile {
         if time_ns >= self.next_picture {
             self.next_picture = (time_ns / PICTURE_NS + 1) * PICTURE_NS;
             message.clear();
-            if self.chunk_bytes + MOST_BODY_BYTES * bodies.len() > MOST_CHUNK_BYTES {
-                self.end_chunk()?;
-            }
             let shown = self.chunk_shows_all.then_some(&self.shown_bodies[..]);
             self.view.frames(&mut message, time_ns, row, (bodies, shown), &self.names);
+            if shown.is_some() && !self.has_room_for(&message) {
+                self.end_chunk()?;
+                message.clear();
+                self.view.frames(&mut message, time_ns, row, (bodies, None), &self.names);
+            }
+            if !self.chunk_shows_all {
+                self.chunk_of_all += message.bytes().len();
+            }
             self.chunk_shows_all = true;
             if bodies.len() > tick::ALWAYS {
                 self.shown_bodies.clear();
@@ -438,6 +459,11 @@ impl McapFile {
         }
         self.message = message;
         written
+    }
+
+    /// It need not go into another chunk.
+    fn has_room_for(&self, message: &Message) -> bool {
+        self.chunk_bytes + message.bytes().len() + MESSAGE_HEAD_BYTES <= MOST_CHUNK_BYTES
     }
 
     fn put(&mut self, channel_id: u16, run_tick: u64, data: &[u8]) -> Result<(), McapError> {
@@ -670,6 +696,7 @@ mod tests {
     use super::super::opened::OtherContent;
     use super::super::read::RecordedRun;
     use super::*;
+    use nalgebra::Vector3;
     use std::path::Path;
 
     fn with_scene(directory: &Path, parts: Vec<Vec<u8>>) -> PathBuf {
@@ -744,6 +771,32 @@ mod tests {
             assert_eq!(*shown, expected, "picture {at}");
         }
         assert_eq!(shown.len(), 50);
+    }
+
+    /// All at once take more than a chunk has of changes.
+    #[test]
+    fn of_very_many_things_a_chunk_tells_all_of_them_once() {
+        const COUNT: usize = 45_000;
+        let directory = tempfile::tempdir().expect("a directory");
+        let path = directory.path().join("r.mcap");
+        let bodies: Vec<String> = (0..COUNT).map(|body| format!("b{body}")).collect();
+        let names = Names { bodies, ..Names::default() };
+        let mut about = About::default();
+        about.tell("period_ns", "1000000".into());
+        let opened = Opened::recording(&path).expect("a file");
+        let mut file = McapFile::create(opened, names, 1_000_000, &about, View::default()).expect("room");
+        let near = Vector3::repeat(0.1);
+        let mut rows = vec![BodyRow { position: near, velocity: near, ..BodyRow::default() }; COUNT];
+        for run_tick in 0..50 {
+            rows[17].position.x += 1e-3;
+            file.append(&Row { run_tick, ..Row::empty() }, &rows, &[]).expect("room");
+        }
+        assert_eq!(file.finish().expect("room"), 50);
+        let bytes = std::fs::read(&path).expect("there");
+        let all = mcap::MessageStream::new(&bytes).expect("sound").map(|message| message.expect("sound"));
+        let large = all.filter(|message| message.data.len() > 50 * COUNT);
+        let topics: Vec<String> = large.map(|message| message.channel.topic.clone()).collect();
+        assert_eq!(topics, [TICK_TOPIC, "/frames"]);
     }
 
     #[test]

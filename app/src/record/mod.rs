@@ -18,6 +18,7 @@ mod files;
 mod foxglove;
 mod marks;
 mod mcap_file;
+mod on_disk;
 mod opened;
 pub mod read;
 mod record_file;

@@ -532,6 +532,14 @@ impl Opened {
         self.file.try_clone()
     }
 
+    /// Another handle of it, to bring it to the disk; `None`: it is a stream, or somebody else's.
+    ///
+    /// # Errors
+    /// If the system has none.
+    pub(super) fn second_handle(&self) -> io::Result<Option<File>> {
+        self.marks.as_ref().map(|_| self.file.try_clone()).transpose()
+    }
+
     /// Handle that it is written by.
     pub(super) fn file(&self) -> &File {
         &self.file

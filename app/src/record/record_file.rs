@@ -8,6 +8,8 @@ use super::mcap_file::McapFile;
 use crate::displaced::Placed;
 use crate::recording::{Recording, RecordingError};
 use crate::row::{BodyRow, Row};
+use std::fs::File;
+use std::io;
 use std::sync::Arc;
 use world::events::Event;
 
@@ -46,6 +48,18 @@ impl RecordFile {
             Self::Csv(file) => file.content(),
             Self::Mcap(file) => file.content(),
             Self::Events(file) => file.content(),
+        }
+    }
+
+    /// Another handle of the file, to bring it to the disk; `None`: there is no disk to reach, or it was taken.
+    ///
+    /// # Errors
+    /// If the system has none.
+    pub(super) fn take_second_handle(&mut self) -> io::Result<Option<File>> {
+        match self {
+            Self::Csv(file) => file.second_handle(),
+            Self::Mcap(file) => Ok(file.take_second_handle()),
+            Self::Events(file) => file.second_handle(),
         }
     }
 

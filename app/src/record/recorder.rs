@@ -14,6 +14,7 @@
 use super::backpressure::{Backpressure, Progress, Wait};
 use super::content::{Content, ContentState};
 use super::destination::shown;
+use super::on_disk::OnDisk;
 use super::record_file::RecordFile;
 use crate::displaced::Placed;
 use crate::fast_loop::WhenFull;
@@ -24,6 +25,7 @@ use crate::row_queue::{ROW_QUEUE, RowReceiver, RowSender, untouched_row_queue_of
 use io_driver::device::run_time_s;
 use io_driver::say::say;
 use std::collections::VecDeque;
+use std::io;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
@@ -165,11 +167,15 @@ impl Recorder {
     /// If there can be no thread.
     pub fn start(
         path: &Path,
-        file: RecordFile,
+        mut file: RecordFile,
         bodies: usize,
         period_ns: u64,
         backpressure: Backpressure,
     ) -> Result<Self, RecordingError> {
+        let no_handle = |source| RecordingError::Create { file: shown(path), source };
+        let no_thread = |source| RecordingError::NoThread { file: shown(path), source };
+        let second_handle = file.take_second_handle().map_err(no_handle)?;
+        let on_disk = second_handle.map(OnDisk::start).transpose().map_err(no_thread)?;
         let (rows, receiver) = untouched_row_queue_of(ROW_QUEUE, MOST_BODIES, bodies);
         let shared = Arc::new(Shared::default());
         let content = file.content();
@@ -177,7 +183,9 @@ impl Recorder {
         let (events, event_ends) = growing_event_queue(MOST_EVENTS);
         let waits = backpressure.when_full == WhenFull::Wait;
         let writer = RecorderThread {
+            path: path.into(),
             file: Some(file),
+            on_disk,
             events: event_ends,
             taken_in: VecDeque::new(),
             waits,
@@ -188,7 +196,7 @@ impl Recorder {
         let thread = std::thread::Builder::new()
             .name("recorder".into())
             .spawn(move || writer.run(receiver))
-            .map_err(|source| RecordingError::NoThread { file: shown(path), source })?;
+            .map_err(no_thread)?;
         let (known, changed) = (vec![None; bodies], Vec::with_capacity(bodies));
         let events = Some(EventFeed {
             events,
@@ -505,8 +513,11 @@ fn panicked(path: &Path) -> String {
 
 /// The recorder's own thread.
 struct RecorderThread {
+    path: PathBuf,
     /// `None` once it failed.
     file: Option<RecordFile>,
+    /// `None` where there is no disk to reach, or once it failed.
+    on_disk: Option<OnDisk>,
     events: EventReceiver,
     /// Events before those, whose row has not come yet.
     taken_in: VecDeque<Event>,
@@ -539,6 +550,12 @@ impl RecorderThread {
                     result = self.abandon(error);
                 }
                 self.shared.progress.wrote(self.file.as_ref().map_or(0, RecordFile::rows));
+                if let Err(error) = self.bring_to_disk(last) {
+                    result = self.abandon(error);
+                }
+            }
+            if let Err(error) = self.bring_to_disk(last) {
+                result = self.abandon(error);
             }
             if is_closing {
                 break;
@@ -556,12 +573,29 @@ impl RecorderThread {
         if self.shared.is_in_vain.load(Ordering::Relaxed) && self.shared.progress.taken() == 0 {
             return Ok(0);
         }
-        file.finish().or_else(|error| self.abandon(error))
+        let finished = file.finish().and_then(|rows| {
+            let ended = self.on_disk.take().map_or(Ok(()), OnDisk::end);
+            ended.map(|()| rows).map_err(|source| self.refused(source, last, rows))
+        });
+        finished.or_else(|error| self.abandon(error))
+    }
+
+    /// Has what was written brought to the disk itself from time to time, up to this tick.
+    fn bring_to_disk(&mut self, last: u64) -> Result<(), RecordingError> {
+        let (Some(file), Some(on_disk)) = (&self.file, &mut self.on_disk) else { return Ok(()) };
+        let rows = file.rows();
+        on_disk.has_rows(rows).map_err(|source| self.refused(source, last, rows))
+    }
+
+    /// The disk did not take all of so many rows, of which the last is of this tick.
+    fn refused(&self, source: io::Error, last: u64, rows: u64) -> RecordingError {
+        let until_s = run_time_s(last.cast_signed(), self.period_ns);
+        RecordingError::of_write(&shown(&self.path), source, &self.content, (until_s, rows))
     }
 
     /// Goes on without a file that takes no more; says how many rows it has, or what is wrong, which it tells.
     fn abandon(&mut self, error: RecordingError) -> Result<u64, RecordingError> {
-        self.file = None;
+        (self.file, self.on_disk) = (None, None);
         // With the file went what could not be cut off of it, if that was possible by then.
         let error = if self.content.load() == Content::Earlier { error.without_noise() } else { error };
         if let RecordingError::Write { rows, .. } = error.cause()

@@ -9,6 +9,7 @@
 
 use super::content::ContentState;
 use super::opened::Opened;
+use std::fs::File;
 use std::io::{self, Seek, SeekFrom, Write};
 use std::sync::Arc;
 
@@ -145,6 +146,14 @@ impl WholeLines {
         }
         self.flush()?;
         self.check_all()
+    }
+
+    /// Another handle of the file ([`Opened::second_handle`]).
+    ///
+    /// # Errors
+    /// As there.
+    pub(crate) fn second_handle(&self) -> io::Result<Option<File>> {
+        self.file.second_handle()
     }
 
     /// Finds out whether the file has what was written, and nothing else.

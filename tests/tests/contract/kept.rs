@@ -191,6 +191,59 @@ fn what_others_write_while_room_is_reserved_is_kept() {
     }
 }
 
+/// Two and a half seconds of it into each kind of file.
+const RECORDS_ALL: [&str; 13] = [
+    "run",
+    "scene.toml",
+    "--clock",
+    "real",
+    "--headless",
+    "--seconds",
+    "2.5",
+    "--record",
+    "out.csv",
+    "--record",
+    "out.mcap",
+    "--events",
+    "out.jsonl",
+];
+
+/// A power failure is not at hand: asked is whether the disk was, again and again, and what becomes of its refusal. A disk that takes
+/// half a minute for an answer keeps nobody waiting before the end.
+#[test]
+fn what_is_recorded_is_brought_to_the_disk_while_the_run_goes_on() {
+    let files = ["out.csv", "out.mcap", "out.jsonl"];
+    let calls = |place: &Workplace, file: &str| {
+        let trace = std::fs::read_to_string(place.path("trace")).expect("a trace");
+        trace.lines().filter(|line| line.contains("fdatasync(") && line.contains(file)).count()
+    };
+    let run = |options: &[&str]| {
+        let place = workplace("0");
+        let options: Vec<&str> = ["-y", "-e", "trace=fdatasync"].iter().chain(options).copied().collect();
+        let strace = traced(&place, &options, &RECORDS_ALL)?;
+        let said = Running::start(strace).wait();
+        Some((place, said))
+    };
+    let Some((place, said)) = run(&[]) else { return };
+    assert_eq!(said.status, Some(0), "{}", said.err);
+    for file in files {
+        // Of five times half a second, on a busy machine, and one in the end.
+        assert!(calls(&place, file) >= 3, "{file}: {}", calls(&place, file));
+    }
+
+    let (_, said) = run(&["-e", "inject=fdatasync:error=EIO:when=2"]).expect("strace was there");
+    assert_eq!(said.status, Some(3), "{}", said.err);
+    for file in ["out.csv", "out.mcap"] {
+        let told = format!("cannot write the recording {file}: Input/output error");
+        assert!(said.err.contains(&told), "{}", said.err);
+    }
+
+    let (place, said) = run(&["-e", "inject=fdatasync:delay_enter=1500000:when=1"]).expect("strace was there");
+    assert_eq!(said.status, Some(0), "{}", said.err);
+    assert!(Table::read(&place.path("out.csv")).numbers("t").len() > 2000);
+    assert!(!(said.out + &said.err).contains("LOST"), "somebody waited for the disk");
+}
+
 /// The calls that make a file of a name with this in it.
 fn makings(place: &Workplace, name: &str) -> Vec<String> {
     let trace = std::fs::read_to_string(place.path("trace")).expect("a trace");

@@ -14,6 +14,9 @@ use crate::roster::Standing;
 use crate::solver::Motion;
 use crate::touch::Touch;
 
+/// As many contact points as come; with others it can be added to.
+const WHAT_COMES: usize = usize::MAX / 2;
+
 impl Manipulation {
     /// How the bodies that are awake would move without anything that touches them; behind them those that others
     /// may lean on.
@@ -80,7 +83,8 @@ impl Manipulation {
         self.touching = self.room.rows.len();
         self.room.restitution.meetings.clear();
         let mut left_out = 0;
-        let room = self.room.rows.capacity() - self.room.rows.len();
+        let grows = self.pairs.grow();
+        let room = if grows { WHAT_COMES } else { self.room.rows.capacity() - self.room.rows.len() };
         let [most_rows, of_bodies] = [room, room - room / 4].map(|room| self.room.rows.len() + room);
         for at in 0..self.pairs.awake_count() {
             let (key, _) = self.pairs.awake_at(at);
@@ -125,6 +129,9 @@ impl Manipulation {
                 },
             );
             self.pairs.set_near(at, is_near);
+        }
+        if grows {
+            self.room.solver.make_room_for(self.room.rows.len());
         }
         self.pairs.left_out += left_out + std::mem::take(&mut self.pairs.missing);
         (touch_rows, pull_rows)

@@ -89,6 +89,7 @@ impl Manipulation {
     pub fn wanted_room(&self) -> Option<Wanted> {
         let has = self.room.counts.of_pairs;
         let wants_rows = self.next_room.is_none()
+            && !self.pairs.grow()
             && has < self.pairs.room() * MAX_POINTS
             && 8 * self.room.rows.len() > 5 * has;
         let wanted = Wanted {

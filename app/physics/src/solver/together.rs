@@ -27,7 +27,25 @@ const SETTLED: f64 = 1e-9;
 #[derive(Debug, Clone, Default)]
 pub(super) struct Room {
     by_body: Vec<usize>,
-    were: Vec<Row>,
+    were: Vec<Was>,
+}
+
+/// All of a row that solving for a body changes, and of what it is.
+#[derive(Debug, Clone, Copy)]
+struct Was {
+    other: Option<usize>,
+    force_W: Vector3<f64>,
+    torque_W: Vector3<f64>,
+    rest_W: Vector3<f64>,
+    stiffness: [f64; 2],
+    damping: [f64; 2],
+}
+
+impl Was {
+    fn of(row: &Row) -> Self {
+        let &Row { other, force_W, rest_W, stiffness, damping, .. } = row;
+        Self { other, force_W, torque_W: row.torque_W(), rest_W, stiffness, damping }
+    }
 }
 
 impl Room {
@@ -76,7 +94,7 @@ pub(super) fn solve(
 
 /// The forces of one body's rows; returns the squares of their largest change and of the largest of them.
 fn solve_body(
-    were: &mut Vec<Row>,
+    were: &mut Vec<Was>,
     newton: &mut Newton,
     which: &[usize],
     rows: &mut [Row],
@@ -85,14 +103,14 @@ fn solve_body(
 ) -> [f64; 2] {
     let body = rows[which[0]].body;
     were.clear();
-    were.extend(which.iter().map(|&at| rows[at]));
+    were.extend(which.iter().map(|&at| Was::of(&rows[at])));
     for &at in which {
         let row = &mut rows[at];
         motions[body].push(&(row.force_W * -dt_s), &row.arms_W[0]);
         motions[body].turn(&(row.torque_W() * -dt_s));
         if let Some(other) = row.other {
             // What all points give to the other together is at most so many times what one does.
-            let sharing = were.iter().filter(|row| row.other == Some(other)).count();
+            let sharing = were.iter().filter(|was| was.other == Some(other)).count();
             soften(row, &motions[other], sharing as f64, dt_s);
         }
     }
@@ -101,7 +119,7 @@ fn solve_body(
     for (&at, was) in which.iter().zip(were.iter()) {
         let row = &mut rows[at];
         (row.rest_W, row.stiffness, row.damping) = (was.rest_W, was.stiffness, was.damping);
-        let (changed_W, turned_W) = (row.force_W - was.force_W, row.torque_W() - was.torque_W());
+        let (changed_W, turned_W) = (row.force_W - was.force_W, row.torque_W() - was.torque_W);
         if let Some(other) = row.other {
             motions[other].push(&(changed_W * -dt_s), &row.arms_W[1]);
             motions[other].turn(&(turned_W * -dt_s));

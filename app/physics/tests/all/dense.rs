@@ -130,6 +130,35 @@ fn without_deadlines_no_pair_is_left_out_and_things_move_as_with_room_for_all() 
     assert!((most_pairs..most_pairs + 256).contains(&room), "{room} for {most_pairs}");
 }
 
+/// Cubes over a floor, which come down in the same tick: more points than have room at first.
+#[test]
+fn without_deadlines_no_contact_point_is_left_out() {
+    let falling = || {
+        let mut entities: Vec<Entity> = vec![floor(0.0, 1000.0, 0.5)];
+        for at in 0..2500 {
+            let [x, z] = [at % 50, at / 50].map(|place| f64::from(place) * 0.04);
+            let cube = Cuboid::new([0.02; 3]).unwrap();
+            entities.push(object(cube, Isometry3::translation(x, 0.06, z), 1000.0, 0.5));
+        }
+        let moving = |at: usize| body(&entities[at], 0.01).moving(Vector3::y() * -10.0, Vector3::zeros());
+        let bodies: Vec<(usize, Body)> = (1..entities.len()).map(|at| (at, moving(at))).collect();
+        let settings = Settings::default();
+        (World::new(entities, &bodies, settings, 0), bodies, settings)
+    };
+    let ((mut world, _, _), (mut growing, bodies, settings)) = (falling(), falling());
+    let begins = Begins { has_deadlines: false, ..Begins::default() };
+    growing.manipulation = Manipulation::begin(&growing.entities, &bodies, settings, begins).unwrap();
+    growing.makes_room = false;
+    for tick in 0..10 {
+        for world in [&mut world, &mut growing] {
+            world.step(&[]);
+        }
+        assert!(world.manipulation.bodies() == growing.manipulation.bodies(), "tick {tick}");
+    }
+    assert_eq!([&world, &growing].map(|world| world.manipulation.left_out()), [0; 2]);
+    assert_eq!(growing.manipulation.rows().len(), 10_000);
+}
+
 /// Things that met while there was no room for them are in each other when there is: nobody has put them there, and they gain
 /// nothing by it.
 #[test]
