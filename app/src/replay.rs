@@ -260,7 +260,7 @@ impl Play {
     /// Takes the rows that came out and puts each beside the one that was recorded.
     fn compare(&mut self) {
         while let Some((row, _)) = self.rows.receive() {
-            let (bodies, placed) = (self.rows.bodies(), self.rows.placed());
+            let (bodies, changed, placed) = (self.rows.bodies(), self.rows.changed(), self.rows.placed());
             let mut feed = lock(&self.feed);
             while feed.reached.front().is_some_and(|(before, _)| before.run_tick <= row.run_tick) {
                 let Some((before, bodies_before)) = feed.reached.pop_front() else { break };
@@ -276,7 +276,7 @@ impl Play {
                 continue;
             }
             for recorder in &mut self.recorders {
-                recorder.send(&row, bodies, placed);
+                recorder.send(&row, (bodies, changed), placed);
             }
         }
     }

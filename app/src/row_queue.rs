@@ -47,6 +47,8 @@ pub struct RowReceiver {
     rows: Consumer<Waiting>,
     bodies: Consumer<(u32, BodyRow)>,
     of_row: Vec<BodyRow>,
+    /// Those that came with the last row.
+    changed: Vec<u32>,
     placed: Consumer<Placed>,
     /// All that ever came, each entity once.
     stand: Vec<Placed>,
@@ -79,6 +81,7 @@ pub fn untouched_row_queue_of(places: usize, most: usize, bodies: usize) -> (Row
         rows: row_ends,
         bodies: bodies_out,
         of_row: vec![BodyRow::default(); bodies],
+        changed: Vec::with_capacity(bodies),
         placed: placed_out,
         stand: Vec::new(),
         lost: Arc::default(),
@@ -158,11 +161,13 @@ impl RowReceiver {
     /// The next row and all bodies, if one waits.
     pub fn receive(&mut self) -> Option<(Row, &[BodyRow])> {
         let (row, [bodies, others], _) = self.rows.pop().ok()?;
+        self.changed.clear();
         for _ in 0..bodies {
             if let Ok((number, body)) = self.bodies.pop()
                 && let Some(place) = self.of_row.get_mut(number as usize)
             {
                 *place = body;
+                self.changed.push(number);
             }
         }
         for _ in 0..others {
@@ -178,6 +183,11 @@ impl RowReceiver {
     /// All bodies as they were with the last row.
     pub fn bodies(&self) -> &[BodyRow] {
         &self.of_row
+    }
+
+    /// The bodies that came with the last row, by their numbers: no others have changed since the row before.
+    pub fn changed(&self) -> &[u32] {
+        &self.changed
     }
 
     /// What is no body and has been moved, where it stood with the last row.

@@ -191,12 +191,12 @@ impl SlowSide {
         for _ in 0..self.rows.waiting() {
             self.tell_lost();
             let Some((row, _)) = self.rows.receive() else { break };
-            let (bodies, placed) = (self.rows.bodies(), self.rows.placed());
+            let (bodies, changed, placed) = (self.rows.bodies(), self.rows.changed(), self.rows.placed());
             // A tick's events are there before its row is.
             self.events.deliver(row.run_tick);
             let requested = self.on_request.as_mut().and_then(OnRequest::recorder);
             for recorder in self.recorders.iter_mut().chain(requested) {
-                recorder.send(&row, bodies, placed);
+                recorder.send(&row, (bodies, changed), placed);
             }
             if let Some(snapshots) = &mut self.snapshots {
                 snapshots.look(&row, bodies, placed);

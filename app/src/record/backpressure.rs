@@ -196,7 +196,7 @@ mod tests {
         let (mut recorder, mut reader) = piped(&directory.path().join("pipe"), Duration::from_millis(300));
         let mut sent = 0;
         while !recorder.has_failed() && sent < 100_000 {
-            recorder.send(&Row { run_tick: sent, ..Row::empty() }, &[], &[]);
+            recorder.send(&Row { run_tick: sent, ..Row::empty() }, (&[], &[]), &[]);
             sent += 1;
         }
         let Recorded { rows, lost, is_left_behind, .. } = recorder.finish();
@@ -223,7 +223,7 @@ mod tests {
             feed.event(&Event { run_tick: tick, kind: Kind::Reset });
             // Of a hundred ticks each.
             if tick % 100 == 0 {
-                recorder.send(&Row { run_tick: tick, ..Row::empty() }, &[], &[]);
+                recorder.send(&Row { run_tick: tick, ..Row::empty() }, (&[], &[]), &[]);
             }
         }
         let (handed_over, lost) = recorder.sent_and_lost();
@@ -253,7 +253,7 @@ mod tests {
         let (in_a_tick, ticks) = (20_000, 3);
         for run_tick in 0..ticks {
             (0..in_a_tick).for_each(|_| feed.event(&Event { run_tick, kind: Kind::Reset }));
-            recorder.send(&Row { run_tick, ..Row::empty() }, &[], &[]);
+            recorder.send(&Row { run_tick, ..Row::empty() }, (&[], &[]), &[]);
         }
         let Recorded { rows, lost, failure, .. } = recorder.finish();
         assert_eq!((rows, lost, failure), (ticks * in_a_tick, 0, None));
@@ -270,14 +270,14 @@ mod tests {
         // A row has eight bytes at least, a pipe 64 KiB, the queue 8192 rows, the table's own buffer 256 KiB.
         let most = 100_000;
         let given_up = (0..most).find(|tick| {
-            recorder.send(&row(*tick), &[], &[]);
+            recorder.send(&row(*tick), (&[], &[]), &[]);
             recorder.has_failed()
         });
         let given_up = given_up.expect("nobody reads");
         let table = std::thread::spawn(move || read_to_the_end(reader));
         patience::until("an empty queue", || recorder.progress().taken() == given_up);
         for tick in given_up + 1..given_up + 1000 {
-            recorder.send(&row(tick), &[], &[]);
+            recorder.send(&row(tick), (&[], &[]), &[]);
         }
         let Recorded { rows, lost, failure, .. } = recorder.finish();
         assert_eq!((rows, lost), (given_up, 1000));

@@ -18,6 +18,7 @@
 //! a file that somebody else has cut or written.
 
 use super::about::{self, About};
+use super::changes::Changes;
 use super::content::ContentState;
 use super::destination::shown;
 use super::event_line::{holders, name, said};
@@ -82,12 +83,12 @@ pub struct McapFile {
     channels: Channels,
     message: Message,
     sequence: u32,
-    /// The chunk has a tick with all bodies, and the newest one these.
+    /// The chunk has a tick with all bodies.
     chunk_has_all: bool,
-    last_bodies: Vec<BodyRow>,
-    /// The chunk has a picture of all bodies, and the newest one these.
+    /// The chunk has a picture of all bodies, and the newest one these; those that have changed since.
     chunk_shows_all: bool,
     shown_bodies: Vec<BodyRow>,
+    changed_since: Changes,
     /// Things that are no bodies and have been moved, as they were told last.
     last_placed: Vec<Placed>,
     /// Length of what the chunk has, and of what in it is of all objects at once; and its first tick.
@@ -154,6 +155,7 @@ impl McapFile {
         let (may_wait, content) = (file.may_wait(), file.content());
         let second_handle = file.second_handle().map_err(|error| failed(error.into()))?;
         let beginning = Arc::new(Beginning::default());
+        let changed_since = Changes::none(names.bodies.len());
         let writes = WholeWrites::new(file, Arc::clone(&beginning));
         let mut writer = options().create(NoSeek::new(writes)).map_err(failed)?;
         let channels = begin(&mut writer, &names, about, view.scene.len()).map_err(failed)?;
@@ -173,9 +175,9 @@ impl McapFile {
             message: Message::new(),
             sequence: 0,
             chunk_has_all: false,
-            last_bodies: Vec::new(),
             chunk_shows_all: false,
             shown_bodies: Vec::new(),
+            changed_since,
             last_placed: Vec::new(),
             chunk_bytes: 0,
             chunk_of_all: 0,
@@ -243,11 +245,17 @@ impl McapFile {
         has_content.load(Ordering::Relaxed) && !has_rows.load(Ordering::Relaxed)
     }
 
-    /// Appends a row and its bodies; `placed` is what else has been moved, where it stands.
+    /// Appends a row and its bodies, of which no others than those of the numbers `changed`, which ascend, have changed since the
+    /// row before; `placed` is what else has been moved, where it stands.
     ///
     /// # Errors
     /// If it or rows before it cannot be written.
-    pub fn append(&mut self, row: &Row, bodies: &[BodyRow], placed: &[Placed]) -> Result<(), RecordingError> {
+    pub fn append(
+        &mut self,
+        row: &Row,
+        bodies: (&[BodyRow], &[u32]),
+        placed: &[Placed],
+    ) -> Result<(), RecordingError> {
         self.beginning.has_rows.store(true, Ordering::Relaxed);
         if self.chunk_rows == 0 {
             self.chunk_began = row.run_tick;
@@ -404,12 +412,17 @@ impl McapFile {
         }
     }
 
-    fn put_row(&mut self, row: &Row, bodies: &[BodyRow], placed: &[Placed]) -> Result<(), McapError> {
+    fn put_row(
+        &mut self,
+        row: &Row,
+        (bodies, changed): (&[BodyRow], &[u32]),
+        placed: &[Placed],
+    ) -> Result<(), McapError> {
         let mut message = std::mem::take(&mut self.message);
         message.clear();
-        let before = self.chunk_has_all.then_some(&self.last_bodies[..]);
-        tick::write(&mut message, row, (bodies, before), &self.names, self.period_ns);
-        if before.is_some() && !self.has_room_for(&message) {
+        let which = self.chunk_has_all.then_some(changed);
+        tick::write(&mut message, row, (bodies, which), &self.names, self.period_ns);
+        if which.is_some() && !self.has_room_for(&message) {
             // Or this tick would be the first of another chunk, without all that has not changed.
             self.end_chunk()?;
             message.clear();
@@ -419,30 +432,23 @@ impl McapFile {
             self.chunk_of_all += message.bytes().len();
         }
         self.chunk_has_all = true;
-        if bodies.len() > tick::ALWAYS {
-            self.last_bodies.clear();
-            self.last_bodies.extend_from_slice(bodies);
-        }
+        self.changed_since.note(changed);
         let mut written = self.put(self.channels.tick, row.run_tick, message.bytes());
         let time_ns = self.time_ns(row.run_tick);
         if time_ns >= self.next_picture {
             self.next_picture = (time_ns / PICTURE_NS + 1) * PICTURE_NS;
             message.clear();
-            let shown = self.chunk_shows_all.then_some(&self.shown_bodies[..]);
-            self.view.frames(&mut message, time_ns, row, (bodies, shown), &self.names);
-            if shown.is_some() && !self.has_room_for(&message) {
+            self.write_frames(&mut message, row, bodies);
+            if self.chunk_shows_all && !self.has_room_for(&message) {
                 self.end_chunk()?;
                 message.clear();
-                self.view.frames(&mut message, time_ns, row, (bodies, None), &self.names);
+                self.write_frames(&mut message, row, bodies);
             }
             if !self.chunk_shows_all {
                 self.chunk_of_all += message.bytes().len();
             }
             self.chunk_shows_all = true;
-            if bodies.len() > tick::ALWAYS {
-                self.shown_bodies.clear();
-                self.shown_bodies.extend_from_slice(bodies);
-            }
+            self.note_shown(bodies);
             written = written.and_then(|()| self.put(self.channels.frames, row.run_tick, message.bytes()));
             if placed != self.last_placed {
                 self.last_placed.clear();
@@ -459,6 +465,32 @@ impl McapFile {
         }
         self.message = message;
         written
+    }
+
+    /// A picture of those that are not where they were in the last one of the chunk, or of all.
+    fn write_frames(&mut self, message: &mut Message, row: &Row, bodies: &[BodyRow]) {
+        let time_ns = self.time_ns(row.run_tick);
+        if bodies.len() <= tick::ALWAYS || !self.chunk_shows_all {
+            return self.view.frames(message, time_ns, row, (bodies, 0..bodies.len()), &self.names);
+        }
+        let shown = &self.shown_bodies;
+        let has_moved = |&at: &usize| {
+            (shown[at].position, shown[at].orientation) != (bodies[at].position, bodies[at].orientation)
+        };
+        let changed = self.changed_since.sorted().iter().map(|&at| at as usize);
+        self.view.frames(message, time_ns, row, (bodies, changed.filter(has_moved)), &self.names);
+    }
+
+    /// The bodies are known as they are.
+    fn note_shown(&mut self, bodies: &[BodyRow]) {
+        if self.shown_bodies.len() == bodies.len() {
+            for &at in self.changed_since.sorted() {
+                self.shown_bodies[at as usize] = bodies[at as usize];
+            }
+        } else {
+            self.shown_bodies = bodies.to_vec();
+        }
+        self.changed_since.forget();
     }
 
     /// It need not go into another chunk.
@@ -710,7 +742,7 @@ mod tests {
         let mut file = McapFile::create(file, names, 1_000_000, &about, view).expect("room");
         for run_tick in 0..3 {
             let row = Row { run_tick, ..Row::empty() };
-            file.append(&row, &[], &[]).expect("room");
+            file.append(&row, (&[], &[]), &[]).expect("room");
         }
         assert_eq!(file.finish().expect("room"), 3);
         path
@@ -750,11 +782,13 @@ mod tests {
         let view = View::new(&scene, &[], true);
         let mut file = McapFile::create(opened, names, 1_000_000, &about, view).expect("room");
         let mut rows = vec![BodyRow::default(); 100];
+        let all: Vec<u32> = (0..100).collect();
         for run_tick in 0..1000 {
             // One moves all the time, and one turns now and then.
             rows[17].position.x += 1e-3;
             rows[42].orientation.w = (run_tick / 100) as f64;
-            file.append(&Row { run_tick, ..Row::empty() }, &rows, &[]).expect("room");
+            let changed: &[u32] = if run_tick == 0 { &all } else { &[17, 42] };
+            file.append(&Row { run_tick, ..Row::empty() }, (&rows, changed), &[]).expect("room");
             if run_tick % 500 == 499 {
                 file.flush().expect("room");
             }
@@ -789,7 +823,7 @@ mod tests {
         let mut rows = vec![BodyRow { position: near, velocity: near, ..BodyRow::default() }; COUNT];
         for run_tick in 0..50 {
             rows[17].position.x += 1e-3;
-            file.append(&Row { run_tick, ..Row::empty() }, &rows, &[]).expect("room");
+            file.append(&Row { run_tick, ..Row::empty() }, (&rows, &[17]), &[]).expect("room");
         }
         assert_eq!(file.finish().expect("room"), 50);
         let bytes = std::fs::read(&path).expect("there");
@@ -818,7 +852,7 @@ mod tests {
         for run_tick in 0..100 {
             let placed = [(0, at(if run_tick < 70 { 0.1 } else { 0.2 }))];
             let row = Row { run_tick, ..Row::empty() };
-            file.append(&row, &[], if run_tick < 30 { &[] } else { &placed }).expect("room");
+            file.append(&row, (&[], &[]), if run_tick < 30 { &[] } else { &placed }).expect("room");
         }
         assert_eq!(file.finish().expect("room"), 100);
         let bytes = std::fs::read(&path).expect("there");

@@ -9,6 +9,7 @@
 
 mod about;
 pub(crate) mod backpressure;
+mod changes;
 mod content;
 mod descriptor;
 pub mod destination;

@@ -75,11 +75,11 @@ impl RecordFile {
     pub(super) fn append(
         &mut self,
         row: &Row,
-        bodies: &[BodyRow],
+        bodies: (&[BodyRow], &[u32]),
         placed: &[Placed],
     ) -> Result<(), RecordingError> {
         match self {
-            Self::Csv(file) => file.append(row, bodies),
+            Self::Csv(file) => file.append(row, bodies.0),
             Self::Mcap(file) => file.append(row, bodies, placed),
             Self::Events(file) => {
                 file.start();

@@ -12,6 +12,7 @@
 //! behind replaces no earlier content any more, which has been told as kept.
 
 use super::backpressure::{Backpressure, Progress, Wait};
+use super::changes::Changes;
 use super::content::{Content, ContentState};
 use super::destination::shown;
 use super::on_disk::OnDisk;
@@ -115,9 +116,8 @@ pub struct Recorder {
     rows: RowSender,
     /// Until somebody takes it.
     events: Option<EventFeed>,
-    /// The bodies as the other end knows them; `None`: it does not know any.
-    known: Vec<Option<BodyRow>>,
-    /// Those that are not so, by their numbers.
+    /// The bodies that the other end does not know as they are; and room for them.
+    unknown: Changes,
     changed: Vec<(u32, BodyRow)>,
     /// Things that are no bodies and have been moved, as the other end knows them; and those that are not so.
     known_placed: Vec<Placed>,
@@ -197,7 +197,7 @@ impl Recorder {
             .name("recorder".into())
             .spawn(move || writer.run(receiver))
             .map_err(no_thread)?;
-        let (known, changed) = (vec![None; bodies], Vec::with_capacity(bodies));
+        let (unknown, changed) = (Changes::all(bodies), Vec::with_capacity(bodies));
         let events = Some(EventFeed {
             events,
             most: if waits { MOST_EVENTS } else { MOST_EVENTS_AT_ONCE },
@@ -211,7 +211,7 @@ impl Recorder {
             unit,
             rows,
             events,
-            known,
+            unknown,
             changed,
             known_placed: Vec::new(),
             changed_placed: Vec::new(),
@@ -254,8 +254,9 @@ impl Recorder {
         self.events.take()
     }
 
-    /// Hands a row over; `placed` is what is no body and has been moved, where it stands.
-    pub fn send(&mut self, row: &Row, bodies: &[BodyRow], placed: &[Placed]) {
+    /// Hands a row over with all bodies, of which those of the numbers `changed` may not be as they were with the row before;
+    /// `placed` is what is no body and has been moved, where it stands.
+    pub fn send(&mut self, row: &Row, (bodies, changed): (&[BodyRow], &[u32]), placed: &[Placed]) {
         if self.is_given_up() {
             self.lost += 1;
             self.untold += 1;
@@ -265,9 +266,10 @@ impl Recorder {
         if self.rows.has_room(0, 0) {
             self.tell_gap(row.run_tick);
         }
+        self.unknown.note(changed);
         self.changed.clear();
-        let numbered = (0..).zip(bodies.iter().copied()).zip(&self.known);
-        self.changed.extend(numbered.filter(|((_, is), was)| Some(*is) != **was).map(|(body, _)| body));
+        let unknown = self.unknown.sorted().iter();
+        self.changed.extend(unknown.filter_map(|&number| Some((number, *bodies.get(number as usize)?))));
         self.note_placed(placed);
         if !self.hand_over(row) {
             self.leave_out();
@@ -275,9 +277,7 @@ impl Recorder {
         }
         self.last_tick = row.run_tick;
         self.sent += 1;
-        for (known, body) in self.known.iter_mut().zip(bodies) {
-            *known = Some(*body);
-        }
+        self.unknown.forget();
     }
 
     /// So many rows are missing before the next one, which nobody had room for.
@@ -541,7 +541,7 @@ impl RecorderThread {
             while let Some((row, _)) = rows.receive() {
                 self.shared.progress.take();
                 last = row.run_tick;
-                let mut written = self.append(&row, rows.bodies(), rows.placed());
+                let mut written = self.append(&row, (rows.bodies(), rows.changed()), rows.placed());
                 if row.run_tick.saturating_sub(flushed).saturating_mul(self.period_ns) >= FLUSH_NS {
                     flushed = row.run_tick;
                     written = written.and_then(|()| self.file.as_mut().map_or(Ok(()), RecordFile::flush));
@@ -616,7 +616,12 @@ impl RecorderThread {
         Err(error)
     }
 
-    fn append(&mut self, row: &Row, bodies: &[BodyRow], placed: &[Placed]) -> Result<(), RecordingError> {
+    fn append(
+        &mut self,
+        row: &Row,
+        bodies: (&[BodyRow], &[u32]),
+        placed: &[Placed],
+    ) -> Result<(), RecordingError> {
         self.tell_lost(row.run_tick, row.run_tick);
         self.file.as_mut().map_or(Ok(()), |file| file.append(row, bodies, placed))?;
         self.write_events(row.run_tick)
@@ -669,6 +674,39 @@ mod tests {
     use crate::recording::Recording;
     use rt_core::signals::StopSignals;
 
+    /// The one thing moves in the rows that are left out, and rests from then on.
+    #[test]
+    fn what_changed_in_rows_that_found_no_room_comes_with_the_next_one() {
+        let directory = tempfile::tempdir().expect("a directory");
+        let path = directory.path().join("out.csv");
+        let names = Names { bodies: vec!["ball".into()], ..Names::default() };
+        let opened = Opened::recording(&path).expect("opened");
+        let file = RecordFile::Csv(Box::new(Recording::begin(opened, names, 1_000_000).expect("room")));
+        let how = Backpressure::new(WhenFull::Drop, &StopSignals::default());
+        let mut recorder = Recorder::start(&path, file, 1, 1_000_000, how).expect("a thread");
+        let shared = Arc::clone(&recorder.shared);
+        // Its thread looks for gaps before each row, and has taken one by then.
+        let standing_still = shared.gaps();
+        let mut ball = BodyRow::default();
+        let mut run_tick = 0;
+        let mut send = |recorder: &mut Recorder, y: f64| {
+            let changed: &[u32] = if ball.position.y == y && run_tick > 0 { &[] } else { &[0] };
+            ball.position.y = y;
+            recorder.send(&Row { run_tick, ..Row::empty() }, (&[ball], changed), &[]);
+            run_tick += 1;
+        };
+        (0..ROW_QUEUE + 2).for_each(|_| send(&mut recorder, 0.0));
+        (0..3).for_each(|_| send(&mut recorder, 0.5));
+        drop(standing_still);
+        patience::until("room", || recorder.rows.has_room(ROW_QUEUE, 0));
+        send(&mut recorder, 0.5);
+        let recorded = recorder.finish();
+        assert!((3..=5).contains(&recorded.lost), "{}", recorded.lost);
+        let table = std::fs::read_to_string(&path).expect("there");
+        let last = table.lines().last().expect("rows");
+        assert!(last.split(',').any(|cell| cell == "0.5"), "{last}");
+    }
+
     /// As on a disk that stands still, and goes on while the run waits for another recording.
     #[test]
     fn a_recorder_that_goes_on_after_it_was_left_behind_leaves_the_earlier_recording() {
@@ -686,7 +724,7 @@ mod tests {
         // Its thread looks for gaps before each row.
         let standing_still = shared.gaps();
         for run_tick in 0..10 {
-            recorder.send(&Row { run_tick, ..Row::empty() }, &[], &[]);
+            recorder.send(&Row { run_tick, ..Row::empty() }, (&[], &[]), &[]);
         }
         let recorded = recorder.finish();
         assert!(recorded.is_left_behind && recorded.is_as_before);

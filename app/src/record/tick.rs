@@ -16,12 +16,12 @@ use shm_abi::MAX_DEVICES;
 /// So many objects are written in every tick.
 pub(super) const ALWAYS: usize = 64;
 
-/// Writes a row and its bodies into an empty message: of more than [`ALWAYS`] those that are not as they were in the tick
-/// `before`, or all.
+/// Writes a row and its bodies into an empty message: of more than [`ALWAYS`] those of the numbers `changed`, which ascend, or
+/// all.
 pub(super) fn write(
     out: &mut Message,
     row: &Row,
-    (bodies, before): (&[BodyRow], Option<&[BodyRow]>),
+    (bodies, changed): (&[BodyRow], Option<&[u32]>),
     names: &Names,
     period_ns: u64,
 ) {
@@ -30,18 +30,25 @@ pub(super) fn write(
     for (index, (_, finger)) in names.fingers.iter().zip(&row.fingers).enumerate() {
         out.message(tick::of_finger(index), |out| write_finger(out, finger, index, names));
     }
-    let before = before.filter(|_| bodies.len() > ALWAYS);
-    let is_new = |index: usize| before.is_none_or(|before| before.get(index) != Some(&bodies[index]));
-    let write_part = |out: &mut Message, part: std::ops::Range<usize>| {
-        for (field, index) in (0..).map(tick::of_object).zip(part).filter(|(_, index)| is_new(*index)) {
-            out.message(field, |out| write_body(out, &bodies[index], names));
-        }
-    };
+    let mut changed = changed.filter(|_| bodies.len() > ALWAYS);
     for (number, part) in tick::parts(bodies.len()).enumerate() {
+        let here = changed.map(|all| {
+            let (here, later) = all.split_at(all.partition_point(|&at| (at as usize) < part.end));
+            changed = Some(later);
+            here
+        });
+        let begin = part.start;
+        let write_object = |out: &mut Message, index: usize| {
+            out.message(tick::of_object(index - begin), |out| write_body(out, &bodies[index], names));
+        };
+        let write_part = |out: &mut Message| match here {
+            None => part.for_each(|index| write_object(out, index)),
+            Some(here) => here.iter().for_each(|&index| write_object(out, index as usize)),
+        };
         match number {
-            0 => write_part(out, part),
-            _ if part.clone().any(is_new) => {
-                out.message(tick::of_part(number), |out| write_part(out, part));
+            0 => write_part(out),
+            _ if here.is_none_or(|here| !here.is_empty()) => {
+                out.message(tick::of_part(number), write_part);
             }
             _ => {}
         }
@@ -297,13 +304,15 @@ mod tests {
             let body = |x: f64| BodyRow { position: Vector3::new(x, 1.0, -0.0), ..BodyRow::default() };
             let first: Vec<_> = (0..count).map(|number| body(number as f64)).collect();
             let mut second = first.clone();
-            [0, 17, count - 1].into_iter().for_each(|changed| second[changed] = body(-1.5));
-            let message = |bodies: &[BodyRow], before: Option<&[BodyRow]>| {
+            let changed = [0, 17, count - 1];
+            changed.into_iter().for_each(|changed| second[changed] = body(-1.5));
+            let message = |bodies: &[BodyRow], changed: Option<&[u32]>| {
                 let mut message = Message::new();
-                write(&mut message, &Row::empty(), (bodies, before), &names, 1_000_000);
+                write(&mut message, &Row::empty(), (bodies, changed), &names, 1_000_000);
                 message.bytes().to_vec()
             };
-            let [whole, changes] = [message(&first, None), message(&second, Some(&first))];
+            let changed = changed.map(|number| number as u32);
+            let [whole, changes] = [message(&first, None), message(&second, Some(&changed))];
             assert_eq!(changes.len() < 500, count > ALWAYS, "{count}: {} of {}", changes.len(), whole.len());
             let all = read(&whole, &names, None).expect("all").1;
             assert_eq!(all, first, "{count}");

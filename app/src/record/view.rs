@@ -7,7 +7,6 @@
 
 use super::destination::RunFormat;
 use super::foxglove::{Rgba, WORLD, arrow, cube, cylinder, frame_in_world, scene_entity, sphere, triangles};
-use super::tick::ALWAYS;
 use super::wire::Message;
 use crate::columns::Names;
 use crate::displaced::Placed;
@@ -68,26 +67,16 @@ impl View {
         }
     }
 
-    /// A `foxglove.FrameTransforms` of all that moves; of more than [`ALWAYS`] bodies those that are not where they were `before`,
-    /// or all.
+    /// A `foxglove.FrameTransforms` of these bodies by their numbers, and of all fingers.
     pub(super) fn frames(
         &self,
         out: &mut Message,
         time_ns: u64,
         row: &Row,
-        (bodies, before): (&[BodyRow], Option<&[BodyRow]>),
+        (bodies, seen): (&[BodyRow], impl Iterator<Item = usize>),
         names: &Names,
     ) {
-        let before = before.filter(|before| before.len() == bodies.len() && bodies.len() > ALWAYS);
-        let stays = |at: usize, body: &BodyRow| {
-            before.is_some_and(|before| {
-                (before[at].position, before[at].orientation) == (body.position, body.orientation)
-            })
-        };
-        for (at, (body, name)) in bodies.iter().zip(&names.bodies).enumerate() {
-            if stays(at, body) {
-                continue;
-            }
+        for (body, name) in seen.map(|at| (&bodies[at], &names.bodies[at])) {
             frame_in_world(out, time_ns, &frame_of(name), &body.position, &body.orientation);
         }
         for (finger, name) in row.fingers.iter().zip(&names.fingers) {

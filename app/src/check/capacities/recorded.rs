@@ -35,6 +35,7 @@ pub(super) fn most_bytes_a_row(rig: &Rig, entities: &[Entity], mut bodies: Vec<B
     });
     let mut row = Row::empty();
     let mut digits = Digits(1);
+    let all: Vec<u32> = (0..bodies.len() as u32).collect();
     for run_tick in 0..rows as u64 {
         row.run_tick = run_tick;
         for finger in row.fingers.iter_mut().take(rig.scene.fingers.len()) {
@@ -51,7 +52,7 @@ pub(super) fn most_bytes_a_row(rig: &Rig, entities: &[Entity], mut bodies: Vec<B
             Some(Written { rows: csv.rows + 1, ..csv })
         });
         mcap = mcap.and_then(|mut mcap| {
-            mcap.recording.append(&row, &bodies, &[]).ok()?;
+            mcap.recording.append(&row, (&bodies, &all), &[]).ok()?;
             Some(Written { rows: mcap.rows + 1, ..mcap })
         });
     }
