@@ -239,6 +239,11 @@ impl McapFile {
         self.second_handle.take()
     }
 
+    /// Nothing more is written, not even what the chunk has.
+    pub(super) fn give_up(&self) {
+        self.beginning.is_given_up.store(true, Ordering::Relaxed);
+    }
+
     /// No row has come, and the file has its earlier content.
     pub fn is_as_before(&self) -> bool {
         let Beginning { has_content, has_rows, .. } = &*self.beginning;
@@ -621,6 +626,8 @@ struct Beginning {
     has_rows: AtomicBool,
     /// Nothing goes out yet.
     is_held: AtomicBool,
+    /// Nothing more goes out.
+    is_given_up: AtomicBool,
 }
 
 /// Gathers what is written until it is flushed, then writes it whole or, if it does not fit, not at all. Into a file that has
@@ -699,7 +706,7 @@ impl Write for WholeWrites {
             return self.file.reserve(bytes);
         }
         let pending = std::mem::take(&mut self.pending);
-        if self.has_ended {
+        if self.has_ended || self.beginning.is_given_up.load(Ordering::Relaxed) {
             return Err(io::Error::other("an earlier write failed"));
         }
         if self.beginning.has_rows.load(Ordering::Relaxed)

@@ -63,6 +63,14 @@ impl RecordFile {
         }
     }
 
+    /// Nothing more is written to it.
+    pub(super) fn give_up(self) {
+        // What lines have gathered goes with them.
+        if let Self::Mcap(file) = self {
+            file.give_up();
+        }
+    }
+
     /// Rows in the file itself, or events.
     pub(super) fn rows(&self) -> u64 {
         match self {

@@ -595,7 +595,10 @@ impl RecorderThread {
 
     /// Goes on without a file that takes no more; says how many rows it has, or what is wrong, which it tells.
     fn abandon(&mut self, error: RecordingError) -> Result<u64, RecordingError> {
-        (self.file, self.on_disk) = (None, None);
+        self.on_disk = None;
+        if let Some(file) = self.file.take() {
+            file.give_up();
+        }
         // With the file went what could not be cut off of it, if that was possible by then.
         let error = if self.content.load() == Content::Earlier { error.without_noise() } else { error };
         if let RecordingError::Write { rows, .. } = error.cause()

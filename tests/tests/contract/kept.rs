@@ -231,11 +231,14 @@ fn what_is_recorded_is_brought_to_the_disk_while_the_run_goes_on() {
         assert!(calls(&place, file) >= 3, "{file}: {}", calls(&place, file));
     }
 
-    let (_, said) = run(&["-e", "inject=fdatasync:error=EIO:when=2"]).expect("strace was there");
+    let (place, said) = run(&["-e", "inject=fdatasync:error=EIO:when=2"]).expect("strace was there");
     assert_eq!(said.status, Some(3), "{}", said.err);
-    for file in ["out.csv", "out.mcap"] {
+    place.run(["export", "out.mcap", "--csv", "exported.csv"]);
+    for (file, table) in [("out.csv", "out.csv"), ("out.mcap", "exported.csv")] {
         let told = format!("cannot write the recording {file}: Input/output error");
-        assert!(said.err.contains(&told), "{}", said.err);
+        let told = said.err.lines().find(|line| line.contains(&told)).expect("told");
+        let rows = Table::read(&place.path(table)).numbers("t").len();
+        assert!(told.ends_with(&format!("({rows} rows)")), "{told}: {rows} rows");
     }
 
     let (place, said) = run(&["-e", "inject=fdatasync:delay_enter=1500000:when=1"]).expect("strace was there");
