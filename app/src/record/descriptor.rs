@@ -36,8 +36,19 @@ pub(super) struct Field {
     pub(super) name: String,
     /// Its type.
     pub(super) kind: Kind,
-    /// Whether there may be several.
-    pub(super) is_repeated: bool,
+    /// How many there may be.
+    pub(super) label: Label,
+}
+
+/// Number of a field's values.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Label {
+    /// One, which is zero or empty where nothing is written.
+    One,
+    /// One or none: what is not written is not there (`optional`).
+    OneOrNone,
+    /// Several (`repeated`).
+    Several,
 }
 
 /// The type of a field.
@@ -84,7 +95,7 @@ impl MessageType {
             number,
             name: name.into(),
             kind,
-            is_repeated: false,
+            label: Label::One,
         };
         Self { name: name.into(), fields: fields.iter().map(field).collect() }
     }
@@ -96,9 +107,18 @@ impl MessageType {
     }
 
     /// With these as well, of which there may be several.
-    pub(super) fn with_repeated(mut self, fields: &[(u32, &str, Kind)]) -> Self {
+    pub(super) fn with_repeated(self, fields: &[(u32, &str, Kind)]) -> Self {
+        self.with(Label::Several, fields)
+    }
+
+    /// With these as well, which may not be there.
+    pub(super) fn with_optional(self, fields: &[(u32, &str, Kind)]) -> Self {
+        self.with(Label::OneOrNone, fields)
+    }
+
+    fn with(mut self, label: Label, fields: &[(u32, &str, Kind)]) -> Self {
         let more = Self::new("", fields).fields;
-        self.fields.extend(more.into_iter().map(|field| Field { is_repeated: true, ..field }));
+        self.fields.extend(more.into_iter().map(|field| Field { label, ..field }));
         self
     }
 }
@@ -134,25 +154,40 @@ fn write_file(out: &mut Message, file: &ProtoFile) {
         out.message(4, |out| {
             out.text(1, &message.name);
             let is_ambiguous = message.has_like_json_names();
+            // A choice of one field is how proto3 says that it may not be there.
+            let mut choices = 0;
             for field in &message.fields {
-                out.message(2, |out| write_field(out, field, is_ambiguous));
+                let choice = (field.label == Label::OneOrNone).then_some(choices);
+                choices += u64::from(choice.is_some());
+                out.message(2, |out| write_field(out, field, is_ambiguous, choice));
+            }
+            for field in message.fields.iter().filter(|field| field.label == Label::OneOrNone) {
+                out.message(8, |out| {
+                    out.text(1, &format!("_{}", field.name));
+                });
             }
         });
     }
     out.text(12, "proto3");
 }
 
-fn write_field(out: &mut Message, field: &Field, has_json_name: bool) {
+fn write_field(out: &mut Message, field: &Field, has_json_name: bool, choice: Option<u64>) {
     const OPTIONAL: u64 = 1;
     const REPEATED: u64 = 3;
     out.text(1, &field.name)
         .whole(3, u64::from(field.number))
-        .whole(4, if field.is_repeated { REPEATED } else { OPTIONAL })
+        .whole(4, if field.label == Label::Several { REPEATED } else { OPTIONAL })
         .whole(5, field.kind.number());
     if let Kind::Message(name) = field.kind {
         out.text(6, name);
     }
+    if let Some(choice) = choice {
+        out.given(9, choice);
+    }
     if has_json_name {
         out.text(10, &field.name);
+    }
+    if choice.is_some() {
+        out.given(17, 1);
     }
 }

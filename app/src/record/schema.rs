@@ -185,9 +185,9 @@ pub(super) fn descriptors(names: &Names) -> Vec<u8> {
             (object::RESIDUAL, "residual", Double),
             (object::CLOSURE, "closure", Bool),
             (object::LIST, "list", Uint64),
-            (object::AS_OF, "as_of", Uint64),
         ],
-    );
+    )
+    .with_optional(&[(object::AS_OF, "as_of", Uint64)]);
     let event = MessageType::new(
         "Event",
         &[

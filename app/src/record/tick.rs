@@ -106,7 +106,7 @@ fn write_body(out: &mut Message, body: &BodyRow, names: &Names) {
         out.whole(object::LIST, u64::from(body.is_slow));
     }
     if let Some(tick) = body.as_of.filter(|_| names.as_of) {
-        out.whole(object::AS_OF, tick);
+        out.given(object::AS_OF, tick);
     }
 }
 
@@ -280,20 +280,22 @@ mod tests {
         (b.orientation_wxyz, b.has_orientation) = ([0.5, -0.5, 0.5, -0.0], true);
         (b.buttons, b.attached, b.space) = (u64::MAX, Some(1), 2);
         (b.normal, b.friction_radius_m) = (Vector3::new(0.6, 0.0, -0.8), 1e-3);
-        let bodies = [BodyRow {
+        let bodies = [None, Some(0), Some(12_340)].map(|as_of| BodyRow {
             position: number(7),
             orientation: Quaternion::new(0.5, -0.5, 0.5, 0.5),
             velocity: number(8),
             angular_velocity: number(9),
             grasp: GraspQuality { contacts: 3, rank: 6, residual: 1e-9, has_force_closure: true },
             is_slow: true,
-            as_of: Some(12_340),
-        }];
-        let mut message = Message::new();
-        write(&mut message, &row, (&bodies, None), &names(), 1_000_000);
-        let (back, bodies_back) = read(message.bytes(), &names(), None).expect("a tick");
-        assert_eq!((back, &bodies_back[..]), (row, &bodies[..]));
-        assert_eq!(cells(&back, &bodies_back), cells(&row, &bodies), "negative zeros among them");
+            as_of,
+        });
+        for body in bodies {
+            let mut message = Message::new();
+            write(&mut message, &row, (&[body], None), &names(), 1_000_000);
+            let (back, bodies_back) = read(message.bytes(), &names(), None).expect("a tick");
+            assert_eq!((back, &bodies_back[..]), (row, &[body][..]));
+            assert_eq!(cells(&back, &bodies_back), cells(&row, &[body]), "negative zeros among them");
+        }
     }
 
     #[test]

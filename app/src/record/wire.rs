@@ -55,10 +55,13 @@ impl Message {
 
     /// A whole number, a bool or a value of an enumeration.
     pub(super) fn whole(&mut self, field: u32, value: u64) -> &mut Self {
-        if value != 0 {
-            self.varint(u64::from(field) << 3 | VARINT);
-            self.varint(value);
-        }
+        if value != 0 { self.given(field, value) } else { self }
+    }
+
+    /// The same where zero is not nothing.
+    pub(super) fn given(&mut self, field: u32, value: u64) -> &mut Self {
+        self.varint(u64::from(field) << 3 | VARINT);
+        self.varint(value);
         self
     }
 

@@ -241,7 +241,8 @@ fn what_is_recorded_is_brought_to_the_disk_while_the_run_goes_on() {
         assert!(told.ends_with(&format!("({rows} rows)")), "{told}: {rows} rows");
     }
 
-    let (place, said) = run(&["-e", "inject=fdatasync:delay_enter=1500000:when=1"]).expect("strace was there");
+    let (place, said) =
+        run(&["-e", "inject=fdatasync:delay_enter=1500000:when=1"]).expect("strace was there");
     assert_eq!(said.status, Some(0), "{}", said.err);
     assert!(Table::read(&place.path("out.csv")).numbers("t").len() > 2000);
     assert!(!(said.out + &said.err).contains("LOST"), "somebody waited for the disk");

@@ -56,6 +56,13 @@ fn with_two_lists_a_run_is_felt_as_with_one_and_recorded_alike_by_one_process_an
     let report = run(&place, "virtual", "two.csv");
     let lists = line(&report, "lists");
     assert!(lists.contains("came") && !lists.contains("0 came"), "{lists}");
+    run(&place, "virtual", "two.mcap");
+    let said = place.run(["export", "two.mcap", "exported.csv"]);
+    assert_eq!(said.status, Some(0), "{}", said.err);
+    let [two, exported] =
+        ["two.csv", "exported.csv"].map(|file| std::fs::read_to_string(place.path(file)).unwrap());
+    let differs = two.lines().zip(exported.lines()).position(|(one, other)| one != other);
+    assert!(two.lines().count() == exported.lines().count() && differs.is_none(), "line {differs:?}");
     run(&place, "lockstep", "lockstep.csv");
     let [two, lockstep] = ["two.csv", "lockstep.csv"].map(|file| std::fs::read(place.path(file)).unwrap());
     assert!(two == lockstep);
