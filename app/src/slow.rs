@@ -10,7 +10,11 @@ use crate::spectator::{Loss, Spectator};
 use io_driver::say::say;
 use std::fmt::Write;
 use std::path::Path;
+use std::time::{Duration, Instant};
 use world::events::{Class, Filter, Hub};
+
+/// Until whoever watches a run as well looks at that again.
+const A_WHILE: Duration = Duration::from_millis(50);
 
 /// The slow side of a run.
 pub struct SlowSide {
@@ -98,10 +102,19 @@ impl SlowSide {
 
     /// Takes everything that is there. A recording that cannot be written tells so itself, and the run goes on.
     pub fn step(&mut self) {
+        self.step_until(None);
+    }
+
+    /// The same for some milliseconds at most, whatever waits: whoever calls has something else to look at.
+    pub fn step_a_while(&mut self) {
+        self.step_until(Some(Instant::now() + A_WHILE));
+    }
+
+    fn step_until(&mut self, until: Option<Instant>) {
         self.desk.iter_mut().for_each(Desk::step);
-        self.take_rows();
+        self.take_rows(until);
         while self.go_on_to_next_scene() {
-            self.take_rows();
+            self.take_rows(until);
         }
         self.end_what_failed();
         self.leave_what_shows_nothing();
@@ -187,8 +200,11 @@ impl SlowSide {
         self.has_lost_its_hand || is_unread || self.spectator.as_ref().is_some_and(Spectator::wants_end)
     }
 
-    fn take_rows(&mut self) {
+    fn take_rows(&mut self, until: Option<Instant>) {
         for _ in 0..self.rows.waiting() {
+            if until.is_some_and(|until| Instant::now() >= until) {
+                break;
+            }
             self.tell_lost();
             let Some((row, _)) = self.rows.receive() else { break };
             let (bodies, changed, placed) = (self.rows.bodies(), self.rows.changed(), self.rows.placed());
@@ -225,7 +241,7 @@ impl SlowSide {
         self.coming = self.coming.take().or_else(|| self.desk.as_mut()?.take_coming());
         let Some(coming) = self.coming.take_if(|coming| coming.rows.waiting() > 0) else { return false };
         // What came in before that row did.
-        self.take_rows();
+        self.take_rows(None);
         self.tell_lost();
         self.scenes += 1;
         let (stay, end): (Vec<_>, Vec<_>) =
@@ -391,5 +407,16 @@ mod tests {
         let lost = all.filter(|message| message.channel.topic == "/events");
         // Before tick 12, and behind the last one.
         assert_eq!(lost.map(|message| message.log_time / 1_000_000).collect::<Vec<_>>(), [12, 15]);
+    }
+
+    #[test]
+    fn a_while_ends_before_all_rows_are_taken_and_the_end_takes_them() {
+        let (mut sender, rows) = row_queue_of(4, 0, 0);
+        let mut slow = SlowSide::new(rows, Hub::new(vec![event_queue(4).1]), Vec::new());
+        send(&mut sender, 0..4);
+        slow.step_until(Some(Instant::now()));
+        assert_eq!((slow.rows.waiting(), slow.newest), (4, None));
+        slow.step_a_while();
+        assert_eq!(slow.rows.waiting(), 0);
     }
 }

@@ -215,7 +215,7 @@ fn run_attached(
     let (report, thread) = fast_thread::start(fast, driver, commander, shared.clone())
         .map_err(|error| no_thread("the fast loop", &error))?;
     let end = loop {
-        slow.step();
+        slow.step_a_while();
         if thread.is_finished() || shared.is_over.load(Ordering::Acquire) {
             break None;
         }
