@@ -22,6 +22,7 @@
 //! # Ok::<(), haptics::mesh::MeshError>(())
 //! ```
 
+mod bends;
 mod beside;
 mod build;
 mod bvh;
@@ -64,6 +65,7 @@ mod walk;
 mod weld;
 mod winding;
 
+pub use bends::{MOST_STANDS, Stand};
 #[cfg(test)]
 pub(crate) use bvh::POPPED;
 pub(crate) use bvh::TooMany;
@@ -82,6 +84,7 @@ pub use soup::TriangleSoup;
 pub use uv::CornerUv;
 pub use walk::MAX_FEATURE_CHANGES;
 
+use bends::Bends;
 use extremes::Extremes;
 use nalgebra::Vector3;
 use std::fmt;
@@ -113,6 +116,8 @@ pub struct Mesh {
     labels: Option<Box<[u16]>>,
     /// Vertices that lie farthest out, if somebody has asked for them.
     extremes: OnceLock<Extremes>,
+    /// How much its vertices stick out, if somebody has asked for it.
+    bends: OnceLock<Bends>,
 }
 
 /// From where a mesh, or a part of it that hangs together by edges, can be felt.

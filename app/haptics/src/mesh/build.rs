@@ -123,6 +123,7 @@ impl Mesh {
             uv: None,
             labels: None,
             extremes: OnceLock::new(),
+            bends: OnceLock::new(),
         };
         report.crossed = mesh.mark_crossed(&parts);
         mesh.turn_outward(&parts, &mut report);
