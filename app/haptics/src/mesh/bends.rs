@@ -165,7 +165,7 @@ impl Clusters<'_> {
             let nearest = near().min_by(|&a, &b| length_m(&[vertex, a]).total_cmp(&length_m(&[vertex, b])));
             goes_to[vertex as usize] = nearest.unwrap_or(vertex);
             // So that the middle of all stays where it is.
-            let part = |to: u32| 1.0 / length_m(&[vertex, to]);
+            let part = |to: u32| length_m(&[vertex, to]).max(f64::MIN_POSITIVE).recip();
             let all: f64 = near().map(part).sum();
             for to in near() {
                 self.bends[to as usize] += self.bends[vertex as usize] * part(to) / all;
