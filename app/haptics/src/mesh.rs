@@ -56,6 +56,7 @@ mod query;
 mod repair;
 mod report;
 mod rolling;
+mod sealed;
 mod sliver;
 mod soup;
 mod topology;
@@ -104,8 +105,10 @@ pub struct Mesh {
     has_inside: bool,
     extent_m: f64,
     longest_edge_m: f64,
-    /// Zero where no sheet crosses anything.
+    /// Zero where no sheet crosses or meets anything.
     point_radius_m: f64,
+    /// Whether there are edges of three and more faces, of whatever parts.
+    has_crowds: bool,
     /// Of a convex solid.
     convex_inner_m: Option<f64>,
     /// Of all meshes that this process has built, which. An address would be another mesh's as soon as this one is gone.
@@ -142,7 +145,8 @@ impl Mesh {
     }
 
     /// Radius with which a point rolls over it as a ball \[m\]; 0: it walks. What passes through a sheet is on both sides of
-    /// it, and of a point on the line in which they cross nobody can tell the side; of a ball beside it everybody can.
+    /// it, and of a point on the line in which they cross, or in which sheets meet, nobody can tell the side; of a ball beside
+    /// it everybody can.
     pub fn point_radius_m(&self) -> f64 {
         self.point_radius_m
     }
@@ -150,7 +154,7 @@ impl Mesh {
     /// The same, felt from both sides though it may be closed: a room, felt by whoever is in it.
     #[must_use]
     pub fn into_sheet(mut self) -> Self {
-        if self.faces.iter().any(|face| face.is_crossed) {
+        if self.has_crowds || self.faces.iter().any(|face| face.is_crossed) {
             self.point_radius_m = self.least_ball_m();
         }
         for face in &mut self.faces {

@@ -210,8 +210,16 @@ impl Understood {
     /// Consequence for a finger.
     fn felt(&self) -> String {
         let sheets = self.report.sheets.count;
+        // A point that walked would pass below what ends there.
+        let is_sealed = self.report.open_parts.count == 0 && self.mesh.point_radius_m() > 0.0;
         match (self.mesh.sides(), self.mesh.has_inside()) {
             (Sides::Solid, _) => "from outside; a finger does not get in".into(),
+            (Sides::Sheet, false) if is_sealed => {
+                "from both sides, as sheets: their rims lie on each other's faces, and no finger comes in there".into()
+            }
+            (Sides::Sheet, true) if is_sealed => format!(
+                "solid parts from outside; the others ({sheets}) from both sides, as sheets whose rims lie on other faces"
+            ),
             (Sides::Sheet, false) => {
                 "from both sides, as a sheet: a finger that comes in through a hole is free within, and feels it from inside".into()
             }

@@ -76,6 +76,8 @@ impl Mesh {
             parts = winding::orient(&mut triangles, &mut links, &mut report);
             report.flipped = flipped;
         }
+        let has_crowds = report.touching_edges.count + report.crowded_edges.count > 0;
+        let mut do_sheets_meet = has_crowds && topology::do_sheets_meet(&triangles, vertices.len(), &parts);
         let copies = pinch::part(&mut triangles, &links, &mut vertices);
         if fold::unfold(&mut triangles, (&links, &parts), &vertices, &copies, &mut report.unfolded) {
             if triangles.is_empty() {
@@ -118,6 +120,7 @@ impl Mesh {
             extent_m,
             longest_edge_m,
             point_radius_m: 0.0,
+            has_crowds,
             convex_inner_m: None,
             identity,
             uv: None,
@@ -125,13 +128,14 @@ impl Mesh {
             extremes: OnceLock::new(),
             bends: OnceLock::new(),
         };
-        report.crossed = mesh.mark_crossed(&parts);
+        do_sheets_meet |= mesh.note_sealed(&parts, &mut report);
+        report.crossed = mesh.mark_crossed(&parts, do_sheets_meet);
         mesh.turn_outward(&parts, &mut report);
         let is_fitting;
         (report.narrow_gaps, is_fitting) = mesh.mark_beside(&parts);
         mesh.fit(&is_fitting, &mut report.narrow_gaps);
         if report.narrow_gaps.moved > 0 {
-            mesh.mark_crossed(&parts);
+            mesh.mark_crossed(&parts, do_sheets_meet);
         }
         report.point_radius_m = mesh.point_radius_m;
         mesh.mark_ledges();

@@ -23,10 +23,10 @@ pub(super) const MOST_PAIRS: usize = 1000;
 
 impl Mesh {
     /// Finds the faces that others pass through, and says how many they are. Those of solids are marked, for walks; where a sheet
-    /// is among them fingers [roll](Self::point_radius_m).
-    pub(super) fn mark_crossed(&mut self, parts: &Parts) -> usize {
+    /// is among them, or meets others as the caller knows, fingers [roll](Self::point_radius_m).
+    pub(super) fn mark_crossed(&mut self, parts: &Parts, do_sheets_meet: bool) -> usize {
         let mut is_crossed = vec![false; self.faces.len()];
-        let mut do_sheets_cross = false;
+        let mut do_sheets_cross = do_sheets_meet;
         let is_done = self.for_each_near_pair(parts, |pair, do_cross| {
             let [one, other] = pair.map(|face| &self.faces[face]);
             // Skins that lie on one another go nowhere.

@@ -13,8 +13,8 @@
 //! 4. What is left looks one way. The two of different pieces that are bent the least are neighbours; all others end there, at
 //!    a rim.
 //!
-//! Limit: the two faces that are joined pass below the ones that end there. A god-object that is pressed into the corner
-//! between them slides through below.
+//! Limit: the two faces that are joined pass below the ones that end there, so a walk over neighbours would slip through between
+//! them. Where one of them is of a sheet, points roll over the mesh as [balls](super::Mesh::point_radius_m), which meet all.
 //! Invariant: each face has one neighbour at most across the edge; neighbours are wound alike as far as their pieces can be.
 //! Cost: linear in the faces, plus sorting the faces of each such edge.
 

@@ -140,8 +140,16 @@ pub struct MeshReport {
     pub closed_holes: Finding,
     /// Parts that have no inside, since they are open or cannot be oriented. The face is the first of the part.
     pub sheets: Finding,
+    /// Those of them that have a rim, or a stretch of one, which does not lie on other faces.
+    pub open_parts: Finding,
+    /// Those of them that have rims, all of which lie on other faces.
+    pub sealed_parts: Finding,
+    /// Those of them that have no rim, and cannot be oriented.
+    pub rimless_parts: Finding,
     /// Edges where the mesh ends: the rim of an open mesh, or a crack.
     pub boundary_edges: Finding,
+    /// Those of them that lie on other faces.
+    pub sealed_edges: usize,
     /// Edges across which inside and outside change places: the mesh cannot be oriented.
     pub turned_edges: Finding,
     /// Faces of the mesh that others pass through.
@@ -205,10 +213,22 @@ impl fmt::Display for MeshReport {
             ),
             (self.closed_holes, "hole", "holes", "closed with a lid"),
             (
-                self.sheets,
+                self.open_parts,
                 "part",
                 "parts",
                 "not closed: felt from both sides; a finger that comes in by a rim is free within",
+            ),
+            (
+                self.sealed_parts,
+                "part",
+                "parts",
+                "not closed, all its rims on other faces: felt from both sides, as walls that end there",
+            ),
+            (
+                self.rimless_parts,
+                "part",
+                "parts",
+                "without a rim and without an outside: felt from both sides",
             ),
             (self.boundary_edges, "edge", "edges", "of one face only: an open rim or a crack"),
             (self.turned_edges, "edge", "edges", "where outside becomes inside: it cannot be oriented"),
@@ -228,7 +248,7 @@ impl fmt::Display for MeshReport {
             if self.point_radius_m > 0.0 {
                 write!(
                     f,
-                    "; a finger of radius 0 rolls over this mesh as a ball of {:.2e} m, since open parts cross others",
+                    "; a finger of radius 0 rolls over this mesh as a ball of {:.2e} m, since open parts cross others or meet them",
                     self.point_radius_m
                 )?;
             }
@@ -238,6 +258,9 @@ impl fmt::Display for MeshReport {
         }
         if self.open_holes.count > 0 {
             write!(f, "\n{}", self.open_holes)?;
+            if self.boundary_edges.count == self.sealed_edges {
+                f.write_str("; all rims lie on other faces")?;
+            }
         }
         Ok(())
     }

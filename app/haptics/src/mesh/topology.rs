@@ -7,7 +7,8 @@
 use super::crowded::{self, Crowd};
 use super::order::Triangle;
 use super::report::MeshReport;
-use super::{Link, MAX_VALENCE, MeshError};
+use super::winding::Parts;
+use super::{Link, MAX_VALENCE, MeshError, Sides};
 use nalgebra::Vector3;
 
 /// The links of every face, as wound in the input.
@@ -33,6 +34,19 @@ pub(super) fn link(
     }
     crowded::join_crowds(&crowds, &rims, triangles, vertices, &mut links, report);
     Ok(links)
+}
+
+/// Whether three and more faces, one of them of a sheet at least, share an edge. Whichever two of them are joined, a walk over
+/// that edge passes below the others on one of its sides.
+pub(super) fn do_sheets_meet(triangles: &[Triangle], vertices: usize, parts: &Parts) -> bool {
+    let (mut sides, starts) = sides_by_lower_vertex(triangles, vertices);
+    starts.windows(2).any(|around| {
+        let around = &mut sides[around[0] as usize..around[1] as usize];
+        around.sort_unstable();
+        around.chunk_by(|a, b| a.upper() == b.upper()).any(|edge| {
+            edge.len() > 2 && edge.iter().any(|side| parts.sides(side.face() as usize) == Sides::Sheet)
+        })
+    })
 }
 
 /// A face's side of an edge. Packed, so that sorting compares one word: bits 32.. the edge's upper vertex, bit 0

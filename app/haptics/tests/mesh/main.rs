@@ -28,6 +28,7 @@ mod parts;
 mod pins;
 mod plates;
 mod queries;
+mod sealed_rims;
 mod unfolded;
 mod walk;
 mod wedges;
