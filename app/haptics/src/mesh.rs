@@ -42,6 +42,7 @@ mod fan;
 mod fit;
 mod fold;
 mod hole;
+mod inverted;
 mod junction;
 mod labels;
 mod ledge;
@@ -105,7 +106,7 @@ pub struct Mesh {
     has_inside: bool,
     extent_m: f64,
     longest_edge_m: f64,
-    /// Zero where no sheet crosses or meets anything.
+    /// Zero where no sheet crosses or meets anything, and nothing is inverted.
     point_radius_m: f64,
     /// Whether there are edges of three and more faces, of whatever parts.
     has_crowds: bool,
@@ -146,7 +147,7 @@ impl Mesh {
 
     /// Radius with which a point rolls over it as a ball \[m\]; 0: it walks. What passes through a sheet is on both sides of
     /// it, and of a point on the line in which they cross, or in which sheets meet, nobody can tell the side; of a ball beside
-    /// it everybody can.
+    /// it everybody can. So it is in pockets of a solid that is turned inside out there.
     pub fn point_radius_m(&self) -> f64 {
         self.point_radius_m
     }

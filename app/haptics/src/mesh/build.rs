@@ -77,7 +77,7 @@ impl Mesh {
             report.flipped = flipped;
         }
         let has_crowds = report.touching_edges.count + report.crowded_edges.count > 0;
-        let mut do_sheets_meet = has_crowds && topology::do_sheets_meet(&triangles, vertices.len(), &parts);
+        let mut must_roll = has_crowds && topology::do_sheets_meet(&triangles, vertices.len(), &parts);
         let copies = pinch::part(&mut triangles, &links, &mut vertices);
         if fold::unfold(&mut triangles, (&links, &parts), &vertices, &copies, &mut report.unfolded) {
             if triangles.is_empty() {
@@ -128,14 +128,18 @@ impl Mesh {
             extremes: OnceLock::new(),
             bends: OnceLock::new(),
         };
-        do_sheets_meet |= mesh.note_sealed(&parts, &mut report);
-        report.crossed = mesh.mark_crossed(&parts, do_sheets_meet);
+        must_roll |= mesh.note_sealed(&parts, &mut report);
+        report.crossed = mesh.mark_crossed(&parts, must_roll);
         mesh.turn_outward(&parts, &mut report);
+        if mesh.point_radius_m == 0.0 && mesh.is_inverted(&parts, report.cavities.count > 0) {
+            must_roll = true;
+            mesh.point_radius_m = mesh.least_ball_m();
+        }
         let is_fitting;
         (report.narrow_gaps, is_fitting) = mesh.mark_beside(&parts);
         mesh.fit(&is_fitting, &mut report.narrow_gaps);
         if report.narrow_gaps.moved > 0 {
-            mesh.mark_crossed(&parts, do_sheets_meet);
+            mesh.mark_crossed(&parts, must_roll);
         }
         report.point_radius_m = mesh.point_radius_m;
         mesh.mark_ledges();

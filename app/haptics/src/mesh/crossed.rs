@@ -7,7 +7,7 @@
 //! each, they are apart (separating axes). What share a vertex are neighbours, and are left out.
 //!
 //! A part that cannot be oriented is no obstacle to itself: a Klein bottle passes through itself, and whoever walks over it
-//! goes on. Where sheets cross anything, points roll over the whole mesh as balls that nobody tells from points: a ball beside a
+//! goes on. Where sheets cross anything, and where a solid is turned inside out ([`inverted`](super::inverted)), points roll over the whole mesh as balls that nobody tells from points: a ball beside a
 //! sheet knows on which side of it it is.
 //!
 //! In doubt a face is taken for crossed: that costs a walk time, and nothing else.
@@ -23,10 +23,10 @@ pub(super) const MOST_PAIRS: usize = 1000;
 
 impl Mesh {
     /// Finds the faces that others pass through, and says how many they are. Those of solids are marked, for walks; where a sheet
-    /// is among them, or meets others as the caller knows, fingers [roll](Self::point_radius_m).
-    pub(super) fn mark_crossed(&mut self, parts: &Parts, do_sheets_meet: bool) -> usize {
+    /// is among them, or for what the caller knows, fingers [roll](Self::point_radius_m).
+    pub(super) fn mark_crossed(&mut self, parts: &Parts, must_roll: bool) -> usize {
         let mut is_crossed = vec![false; self.faces.len()];
-        let mut do_sheets_cross = do_sheets_meet;
+        let mut do_sheets_cross = must_roll;
         let is_done = self.for_each_near_pair(parts, |pair, do_cross| {
             let [one, other] = pair.map(|face| &self.faces[face]);
             // Skins that lie on one another go nowhere.

@@ -9,7 +9,8 @@
 //! it takes the one that leads towards the HIP. Where three faces meet and hold it, each pair has its turn, and it rests.
 //!
 //! Limit: two faces are known at a time; where four and more meet in a point a walk may rest although there is a way on. Faces
-//! that have a vertex in common are taken for neighbours, though a fan that is folded may pass through itself.
+//! that have a vertex in common are taken for neighbours: over a fan that passes through itself points roll
+//! ([`inverted`](super::inverted)).
 
 use nalgebra::Vector3;
 

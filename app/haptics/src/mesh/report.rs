@@ -245,13 +245,14 @@ impl fmt::Display for MeshReport {
                 "\n{} {faces} that others cross or touch: felt as far as they are outside of what is closed",
                 self.crossed
             )?;
-            if self.point_radius_m > 0.0 {
-                write!(
-                    f,
-                    "; a finger of radius 0 rolls over this mesh as a ball of {:.2e} m, since open parts cross others or meet them",
-                    self.point_radius_m
-                )?;
-            }
+        }
+        if self.point_radius_m > 0.0 {
+            write!(
+                f,
+                "\nopen parts that meet or cross, or folds that go through each other: a finger of radius 0 rolls over this mesh as a \
+                 ball of {:.2e} m, since a point would slip between them",
+                self.point_radius_m
+            )?;
         }
         if self.narrow_gaps.faces > 0 {
             write!(f, "\n{}", self.narrow_gaps)?;

@@ -111,8 +111,11 @@ fn beside_a_folded_vertex_a_finger_is_free() {
     let pyramid = built(soup);
     let entity = touchable(&pyramid, Friction::None);
     let mut free = 0;
+    // Over this one a point rolls as a ball, which begins to touch a radius away.
+    assert!((1e-7..=1e-5).contains(&pyramid.point_radius_m()));
+    let touches = |p: &Vector3<f64>| oracle::distance(&pyramid, p) <= pyramid.point_radius_m();
     for p in points(&pyramid, 3000) {
-        if oracle::winding_number(&pyramid, &p) > -0.5 {
+        if oracle::winding_number(&pyramid, &p) > -0.5 || touches(&p) {
             continue;
         }
         // Where the surface is inside out, and its normals point to the finger that sees it first.
@@ -126,7 +129,7 @@ fn beside_a_folded_vertex_a_finger_is_free() {
         let p = apex + noise.vector(0.01);
         let number = oracle::winding_number(&pyramid, &p);
         let out = step(&mut point_finger(), &entity, &p);
-        assert_eq!(out.entity.is_some(), number > 0.5, "{p:?} {number} {out:?}");
+        assert_eq!(out.entity.is_some(), number > 0.5 || touches(&p), "{p:?} {number} {out:?}");
     }
     assert!(free > 100, "{free}");
 }

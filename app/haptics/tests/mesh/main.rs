@@ -27,6 +27,7 @@ mod overlaps;
 mod parts;
 mod pins;
 mod plates;
+mod pockets;
 mod queries;
 mod sealed_rims;
 mod unfolded;

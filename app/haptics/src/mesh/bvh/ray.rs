@@ -52,7 +52,7 @@ impl<const WIDTH: usize> Bvh<WIDTH> {
     /// How often the closed parts go around a point: 0 outside, 1 inside of one, 2 where two overlap, negative where
     /// a surface is turned inside out. `None` if that takes more than `most_visits` nodes and runs of faces on each of
     /// three rays.
-    pub(super) fn winding_number(
+    pub(in crate::mesh) fn winding_number(
         &self,
         triangles: Triangles<'_>,
         p_B: &Vector3<f64>,
