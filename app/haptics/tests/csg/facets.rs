@@ -5,8 +5,8 @@ use std::f64::consts::PI;
 use crate::common::*;
 use crate::joints::{SIZE_M, contains, joined};
 use crate::trees::{self, ball, built, cuboid, v};
-use haptics::{Capsule, Csg, CsgPart, CsgTree, Cylinder, Facets, Torus};
-use nalgebra::Vector3;
+use haptics::{Capsule, Csg, CsgPart, CsgTree, Cylinder, Facets, Plane, Torus};
+use nalgebra::{Isometry3, Vector3};
 
 /// Sum of the tetrahedra's volumes over the origin.
 fn volume_m3(facets: &Facets) -> f64 {
@@ -201,4 +201,32 @@ fn a_box_with_many_long_bores_is_as_large_as_the_box() {
     let bored = 60.0 * PI * 1e-6 * 0.1;
     let missing = 1e-3 - volume_m3(&facets);
     assert!((0.9..1.01).contains(&(missing / bored)), "{missing}");
+}
+
+/// What is made of planes alone is as large as its corners are far.
+#[test]
+fn a_solid_of_planes_alone_is_drawn_to_its_corners() {
+    let wall = |normal: [f64; 3], offset_m: f64| {
+        CsgPart::new(Plane::new(Vector3::from(normal).normalize(), offset_m).unwrap(), Isometry3::identity())
+    };
+    let pyramid = [[1.0, 1.0, 1.0], [-1.0, -1.0, 1.0], [-1.0, 1.0, -1.0], [1.0, -1.0, -1.0]];
+    let facets = built(&CsgTree::intersection(pyramid.map(|normal| wall(normal, 0.05)))).facets();
+    // Corners are three times as far from the middle as the walls are, on the diagonals of a cube.
+    let edge_m = 2.0 * 3.0 * 0.05 / 3f64.sqrt();
+    assert!((size(&facets) - Vector3::repeat(edge_m)).amax() < 1e-9, "{:?}", size(&facets));
+    assert!((volume_m3(&facets) - edge_m.powi(3) / 3.0).abs() < 1e-9, "{}", volume_m3(&facets));
+    assert_eq!(facets.triangles.len(), 4);
+    // A corner of a room goes on for ever; it is cut off a little behind what is bounded.
+    let room = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]].map(|normal| wall(normal, 0.05));
+    assert!(size(&built(&CsgTree::intersection(room)).facets()).amax() < 0.11);
+}
+
+/// A slice of a ring, as thin as the hundredth part of its tube.
+#[test]
+fn a_ring_is_as_thick_as_its_tube() {
+    let ring = CsgPart::new(Torus::new(0.05, 0.02).unwrap(), Isometry3::identity());
+    let slice = CsgPart::at(cuboid([0.2, 0.01, 0.2]), v(0.0, 0.0249, 0.0));
+    let facets = built(&CsgTree::intersection([ring, slice])).facets();
+    // A chord of the tube misses 0.12 % of its radius.
+    assert!((size(&facets).y - 1e-4).abs() < MISSED * 0.02, "{:?}", size(&facets));
 }

@@ -105,7 +105,7 @@ fn rings(kind: Kind, far_L: &[Vector3<f64>], around: usize, ends: impl Fn() -> [
                 .into()
         }
         Kind::Ring { ring_radius_m, tube_radius_m } => {
-            let steps = around / 2;
+            let steps = around;
             let mut angles: Vec<f64> = (0..steps).map(|k| TAU * k as f64 / steps as f64).collect();
             lines_through(&mut angles, pitches().map(turned));
             let mut rings: Vec<[f64; 2]> = angles
