@@ -120,6 +120,43 @@ pub(super) fn strained_places(guides: &[Guide]) -> Vec<Vector3<f64>> {
     (0..guides.len()).step_by(every_guide).filter_map(about).flat_map(off).collect()
 }
 
+/// Places spread evenly over each of these fields that has an end, of which a force is largest: one in each, and of all together.
+/// The fewer fields there are, the more places are looked at.
+pub(super) fn spread_places(fields: &[&Field], force_n: impl Fn(&Vector3<f64>) -> f64) -> Vec<Vector3<f64>> {
+    let each = (MOST_SPREAD / (fields.len() * fields.len()).max(1)).min(MOST_IN_FIELD);
+    let (mut best, mut all) = (Vec::new(), Vec::new());
+    for [low, high] in fields.iter().filter_map(|field| extents(field)) {
+        let shares = |at: usize| GOLDEN.map(|step| (0.5 + at as f64 * step).fract());
+        let place = |at: usize| low + (high - low).component_mul(&Vector3::from(shares(at)));
+        let mut here: Vec<(f64, Vector3<f64>)> =
+            (0..each).map(place).map(|place_W| (force_n(&place_W), place_W)).collect();
+        here.sort_by(|a, b| b.0.total_cmp(&a.0));
+        best.extend(here.first().copied());
+        all.extend(here.into_iter().skip(1).take(MOST_OF_ALL));
+    }
+    for found in [&mut best, &mut all] {
+        found.sort_by(|a, b| b.0.total_cmp(&a.0));
+    }
+    best.truncate(MOST_BEST);
+    let found = best.into_iter().chain(all.into_iter().take(MOST_OF_ALL));
+    // Each is climbed from, which asks all fields again.
+    let most = (MOST_ASKED / fields.len().max(1)).max(MOST_OF_ALL);
+    found.take(most).map(|(_, place_W)| place_W).collect()
+}
+
+/// The box around the places where a field is felt in full, its lowest corner and its highest; `None` if it has no end.
+fn extents(field: &Field) -> Option<[Vector3<f64>; 2]> {
+    let region = field.region();
+    if region.is_everywhere() {
+        return None;
+    }
+    let middle_W = region.felt_near(&Vector3::zeros());
+    let mut ends = directions().map(|along| region.felt_near(&(middle_W + along * FAR_M)));
+    let first = ends.next()?;
+    let [low, high] = ends.fold([first; 2], |[low, high], end| [low.inf(&end), high.sup(&end)]);
+    ((high - low).amax() < FAR_M).then_some([low, high])
+}
+
 /// The place to which a force leads from another one: always to the neighbour with the larger one, near or far.
 pub(super) fn climbed(force_n: impl Fn(&Vector3<f64>) -> f64, from_W: &Vector3<f64>) -> Vector3<f64> {
     let (mut place_W, mut most_n) = (*from_W, force_n(from_W));
@@ -202,6 +239,18 @@ const STEPS: usize = 8;
 const FARTHEST_M: f64 = 0.1;
 /// Of a force: less is no climb.
 const LEAST_GAIN: f64 = 1e-6;
+/// Fields that are asked at places which are spread over them; and such places in each.
+const MOST_SPREAD: usize = 2_000_000;
+const MOST_IN_FIELD: usize = 4000;
+/// Of these places the best, one in each field; and of all together.
+const MOST_BEST: usize = 48;
+const MOST_OF_ALL: usize = 16;
+/// Fields times places from which is climbed.
+const MOST_ASKED: usize = 8192;
+/// Powers of the plastic number's like in three dimensions: places of this sequence lie evenly (M. Roberts 2018).
+const GOLDEN: [f64; 3] = [0.819_172_513_396_164_4, 0.671_043_606_703_789_2, 0.549_700_477_901_970_3];
+/// Farther than fields with an end reach (m).
+const FAR_M: f64 = 1e3;
 /// Of leading a place.
 const ROUNDS: usize = 20;
 const ARRIVED_M: f64 = 1e-6;

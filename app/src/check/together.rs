@@ -14,7 +14,7 @@
 #![allow(non_snake_case)] // Frames are capital letters.
 
 use super::common_places::{
-    Effect, climbed, common_places, directions, forceful_places, places_in, strained_places,
+    Effect, climbed, common_places, directions, forceful_places, places_in, spread_places, strained_places,
 };
 use super::warnings::Stands;
 use super::whereabouts::Whereabouts;
@@ -280,7 +280,9 @@ impl<'a> World<'a> {
         places.extend(strained);
         places = once(places);
         let every = places.len().div_ceil(MOST_CLIMBED).max(1);
-        let climbed: Vec<_> = places.iter().step_by(every).map(|place_W| climbed(force_n, place_W)).collect();
+        let spread = self.spread_places(force_n);
+        let begins = places.iter().step_by(every).chain(&spread);
+        let climbed: Vec<_> = begins.map(|place_W| climbed(force_n, place_W)).collect();
         places.extend(climbed);
         places.extend(places_in(&effects, self.entities));
         once(places)
@@ -293,6 +295,14 @@ impl<'a> World<'a> {
             _ => None,
         });
         forceful_places(&pulls.collect::<Vec<_>>())
+    }
+
+    /// Places all over constant fields where forces are largest: where some add up that are no group, as they meet others.
+    fn spread_places(&self, force_n: impl Fn(&Vector3<f64>) -> f64) -> Vec<Vector3<f64>> {
+        let is_constant = |field: &&Field| matches!(field.kind(), FieldKind::Constant { .. });
+        let constant: Vec<&Field> = self.fields.iter().filter(is_constant).collect();
+        // One alone is judged by itself.
+        if self.fields.len() + self.guides.len() > 1 { spread_places(&constant, force_n) } else { Vec::new() }
     }
 
     /// Entities of the world itself that a finger may touch there.
@@ -386,6 +396,13 @@ fn taking_part(parts: impl Iterator<Item = (usize, f64)>) -> Option<Vec<usize>> 
     (things.len() > 1).then_some(things)
 }
 
+impl Sum {
+    /// Of what is allowed.
+    fn share(&self) -> f64 {
+        self.value / self.limit
+    }
+}
+
 impl Found {
     fn add(&mut self, kind: Kind, things: Vec<usize>, sum: Sum) {
         let kept = self.0.entry((kind, things)).or_insert(sum);
@@ -394,20 +411,20 @@ impl Found {
         }
     }
 
-    /// Of groups within others of the same kind only the others.
+    /// Of groups within others of the same kind only the others, unless they are stronger by more than those tell: where some of a
+    /// group take away, the rest is stronger beside them.
     fn told(self, name: impl Fn(usize) -> String) -> Vec<String> {
-        let is_part = |(kind, things): &(Kind, Vec<usize>)| {
-            let holds = |(of, all): &(Kind, Vec<usize>)| {
+        let is_part = |(kind, things): &(Kind, Vec<usize>), sum: &Sum| {
+            let holds = |((of, all), whole): (&(Kind, Vec<usize>), &Sum)| {
                 of == kind
                     && all.len() > things.len()
                     && things.iter().all(|thing| all.binary_search(thing).is_ok())
+                    && sum.share() <= whole.share() * (1.0 + STRONGER)
             };
-            *kind != Kind::Contacts && self.0.keys().any(holds)
+            *kind != Kind::Contacts && self.0.iter().any(holds)
         };
-        let mut beyond: Vec<_> = self.0.iter().filter(|(group, _)| !is_part(group)).collect();
-        beyond.sort_by(|((a, _), s), ((b, _), t)| {
-            a.cmp(b).then((t.value / t.limit).total_cmp(&(s.value / s.limit)))
-        });
+        let mut beyond: Vec<_> = self.0.iter().filter(|(group, sum)| !is_part(group, sum)).collect();
+        beyond.sort_by(|((a, _), s), ((b, _), t)| a.cmp(b).then(t.share().total_cmp(&s.share())));
         let more = beyond.len().saturating_sub(MOST_TOLD);
         let told = |((kind, things), sum): &(&(Kind, Vec<usize>), &Sum)| {
             let names: Vec<String> = things.iter().map(|&thing| name(thing)).collect();
@@ -538,6 +555,8 @@ const BELOW_M: f64 = 1e-3;
 const ABOVE: f64 = 0.01;
 /// Of what adds most along an axis: what adds less is not named.
 const TAKES_PART: f64 = 0.05;
+/// Of a sum: more is another one.
+const STRONGER: f64 = 0.01;
 /// Of making a sum of forces larger.
 const ROUNDS: usize = 8;
 /// Of shares that are 1 together by what a scene says.

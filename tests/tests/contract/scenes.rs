@@ -454,6 +454,43 @@ fn check_judges_constant_forces_and_vibrations_on_the_sum_at_a_place() {
 }
 
 #[test]
+fn check_finds_where_constant_fields_add_up_that_no_pair_tells() {
+    // Rims where some of several overlap, far from where most of them do: found by 50,000 random places.
+    type Wind = ([f64; 3], [f64; 3], &'static [f64], f64);
+    let crowd: &[Wind] = &[
+        ([-4.4062, 0.0481, 1.5492], [-0.0044, 0.0362, 0.0053], &[0.083, 0.132, 0.1148], 0.001),
+        ([-7.5141, 1.6502, 4.3083], [0.0029, 0.0229, -0.0052], &[0.0735], 0.01),
+        ([1.5113, -1.0142, -4.4585], [0.1703, -0.0479, -0.0024], &[0.1051, 0.1305, 0.0534], 0.001),
+        ([2.9305, 0.3096, 1.9969], [0.0856, -0.0315, -0.0433], &[0.1326, 0.1126, 0.1352], 0.005),
+        ([4.1267, -2.2835, -5.7867], [0.0085, 0.0186, -0.0102], &[0.1408, 0.1131, 0.1311], 0.005),
+        ([-1.6987, -0.8748, -6.8577], [0.0376, 0.0432, -0.0098], &[0.0636], 0.005),
+        ([4.1088, 7.6437, 1.6773], [-0.0115, 0.0527, -0.0407], &[0.0217], 0.01),
+    ];
+    let few: &[Wind] = &[
+        ([-1.3367, -3.2719, -0.1235], [-0.006, -0.0011, 0.04], &[0.0501, 0.0634, 0.0726], 0.005),
+        ([-6.2054, 1.9051, 1.8053], [-0.0164, -0.0698, 0.0471], &[0.0495], 0.01),
+        ([4.0841, 7.6663, -0.2202], [0.0219, 0.0219, 0.0276], &[0.0512], 0.001),
+        ([1.6649, 4.1512, -2.6016], [-0.0804, -0.0238, 0.0776], &[0.1361, 0.1281, 0.1182], 0.005),
+    ];
+    for (winds, felt_n) in [(crowd, 13.6), (few, 13.4)] {
+        let field = |(force_n, at_m, size_m, rim_m): &Wind| {
+            let shape = match size_m {
+                [radius_m] => format!("kind = \"sphere\", radius_m = {radius_m}"),
+                _ => format!("kind = \"box\", size_m = {size_m:?}"),
+            };
+            format!(
+                "[[field]]\nkind = \"constant\"\nforce_n = {force_n:?}\nposition_m = {at_m:?}\nrim_m = {rim_m}\n\
+                 shape = {{ {shape} }}\n"
+            )
+        };
+        let told = warnings(&winds.iter().map(field).collect::<String>());
+        let newtons = |told: &String| told.split("feels ").nth(1)?.split(' ').next()?.parse::<f64>().ok();
+        let most_n = told.iter().filter_map(newtons).fold(0.0, f64::max);
+        assert!(most_n >= felt_n, "{felt_n}: {told:?}");
+    }
+}
+
+#[test]
 fn check_adds_the_pulls_of_guides_magnets_and_thin_fields() {
     let none: [String; 0] = [];
     let line = |x: f64, more: &str| {
