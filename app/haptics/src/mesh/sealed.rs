@@ -77,7 +77,7 @@ impl Mesh {
     }
 
     fn along(&self, edge: &Edge, looks: &mut usize) -> Along {
-        let on_m = ON * self.extent_m;
+        let on_m = (ON * self.extent_m).min(NARROW * self.least_ball_m());
         let (middle_B, half) = (edge.from + 0.5 * edge.way, 0.5 * edge.way.abs().add_scalar(2.0 * on_m));
         let most = *looks;
         let mut found = Found { covered: Vec::new(), looks: most };
@@ -96,7 +96,8 @@ impl Mesh {
         *looks = found.looks;
         let mut covered = found.covered;
         covered.sort_by(|a, b| a[0].total_cmp(&b[0]));
-        let [on, long] = [on_m, LONG * self.extent_m].map(|length_m| length_m / edge.way.norm());
+        let on = on_m / edge.way.norm();
+        let long = (LONG * on).min(HALF);
         let end = covered
             .iter()
             .fold(0.0, |end: f64, [from, to]| if *from <= end + on { end.max(*to) } else { end });
@@ -145,10 +146,13 @@ fn clip(piece: &mut [f64; 2], levels: [f64; 2], most: f64) -> Option<()> {
     (piece[0] < piece[1]).then_some(())
 }
 
-/// Of the extent: nearer to a face is on it.
-const ON: f64 = 1e-10;
-/// Of the extent: what lies along less of a rim has only a point in common with it.
-const LONG: f64 = 1e-6;
+/// Of the extent: nearer to a face is on it. Three times what coordinates of 24 bits are rounded by.
+const ON: f64 = 2e-7;
+/// Of the radius with which points roll then, which fits through no such gap.
+const NARROW: f64 = 0.1;
+/// Of that distance: what lies along less of a rim has only a point in common with it; and of the rim, if that is shorter.
+const LONG: f64 = 500.0;
+const HALF: f64 = 0.5;
 /// Sine of the angle below which two faces that end at one edge lie upon each other.
 const UPON: f64 = 1e-3;
 /// Boxes and faces that are looked at, for all rims.

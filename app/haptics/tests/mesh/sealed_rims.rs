@@ -81,8 +81,8 @@ fn walls_between_skins_are_sealed() {
 #[test]
 fn rims_that_a_finger_gets_past_are_open() {
     let room = || cuboid([0.2, 0.1, 0.1]);
-    // Short on one side, by a nanometre and more; and beyond the skin.
-    for short_m in [1e-9, 1e-6, 0.02] {
+    // Short on one side, by more than numbers of files are rounded by; and beyond the skin.
+    for short_m in [1e-7, 1e-6, 0.02] {
         let [open, sealed, ..] = told(&with(room(), &[wall(0, 0.1, [0.0; 2], [0.1 - short_m, 0.1])]));
         assert_eq!([open, sealed], [1, 0], "{short_m}");
         let [open, sealed, ..] = told(&with(room(), &[wall(0, 0.1, [0.0; 2], [0.1 + short_m, 0.1])]));
@@ -296,6 +296,59 @@ fn out_of_hollow_rooms_that_touch_along_an_edge_no_finger_gets() {
                 let god = if output.entity.is_some() { output.god_object_W } else { hip };
                 let in_room = pose.inverse_transform_point(&nalgebra::Point3::from(god));
                 assert!(in_room.iter().all(|x| (-1e-9..0.1 + 1e-9).contains(x)), "{round}: {in_room}");
+            }
+        }
+    }
+}
+
+/// A wall that ends a little above the floor, by what files round its corners by, is sealed, and nothing gets below it.
+#[test]
+fn below_a_wall_that_is_short_by_a_rounding_no_finger_gets() {
+    let mut noise = Noise(4);
+    for round in 0..60 {
+        let gap_m = [0.0, 1e-13, 1e-11, 1e-9, 1e-8][round % 5];
+        let mut turn = || noise.between(-1.0, 1.0);
+        let pose = Isometry3::new(
+            Vector3::new(turn(), turn(), turn()) * 0.02,
+            Vector3::new(turn(), turn(), turn()) * 3.0,
+        );
+        let at = |at: [f64; 3]| (pose * nalgebra::Point3::from(at)).coords;
+        // A floor, and a bell of five walls upon it.
+        let mut bell: Vec<Quad> = cuboid([0.1, 0.08, 0.08])
+            .into_iter()
+            .enumerate()
+            .filter(|(side, _)| *side != 2)
+            .map(|(_, quad)| quad)
+            .collect();
+        for corner in bell.as_flattened_mut() {
+            *corner = [corner[0] - 0.05, corner[1] + gap_m, corner[2] - 0.04];
+        }
+        let floor = [[-0.15, 0.0, -0.15], [-0.15, 0.0, 0.15], [0.15, 0.0, 0.15], [0.15, 0.0, -0.15]];
+        let mut all = soup(&with(bell, &[floor]));
+        all.vertices.iter_mut().for_each(|vertex| *vertex = at((*vertex).into()));
+        let (mesh, report) = Mesh::build_closing(all, CloseHoles::UpTo(0.0)).unwrap();
+        assert_eq!((report.sealed_parts.count, report.open_parts.count), (1, 1), "{gap_m}: {report}");
+        let entity = touchable(&Arc::new(mesh), Friction::None);
+        // Within the bell or beside it; pressed into floor and wall.
+        let side = if round % 2 == 0 { 1.0 } else { -1.0 };
+        let mut finger = finger(0.0);
+        let mut hip = at([0.05 + 0.02 * side, 0.02, 0.0]);
+        step(&mut finger, &entity, &hip);
+        for _ in 0..20 {
+            let aim = at([
+                0.05 + side * noise.between(-0.02, 0.004),
+                noise.between(-0.02, 0.004),
+                noise.between(-0.03, 0.03),
+            ]);
+            let ticks = ((aim - hip).norm() / 5e-4).ceil() as u32 + 1;
+            let begin = hip;
+            for tick in 1..=ticks {
+                hip = begin + (aim - begin) * (f64::from(tick) / f64::from(ticks));
+                let output = step(&mut finger, &entity, &hip);
+                let god = if output.entity.is_some() { output.god_object_W } else { hip };
+                let place = pose.inverse_transform_point(&nalgebra::Point3::from(god));
+                let is_beside = side * (place.x - 0.05) > -1e-6 && place.y > -1e-6;
+                assert!(is_beside, "{round}, {gap_m}: {place} of {hip}");
             }
         }
     }
