@@ -15,7 +15,7 @@ use nalgebra::Vector3;
 
 use super::crossed::MOST_PAIRS;
 use super::winding::Parts;
-use super::{Face, Mesh, Sides};
+use super::{Face, Mesh};
 
 impl Mesh {
     /// Whether points must roll, since walks come below faces or into pockets. Closed parts are turned outward by now; without
@@ -26,11 +26,13 @@ impl Mesh {
         self.bvh.for_each_pair(0.0, |i, j| {
             left -= 1;
             let pair = [i, j].map(|face| &self.faces[face as usize]);
+            // Few are, and that is known by now.
+            let are_crossed = pair[0].is_crossed && pair[1].is_crossed;
             let common = pair[0].vertices.iter().filter(|vertex| pair[1].vertices.contains(vertex)).count();
-            let is_one = parts.of(i as usize) == parts.of(j as usize);
-            let are_solid = pair.iter().all(|face| face.sides == Sides::Solid);
+            let is_one = || parts.of(i as usize) == parts.of(j as usize);
             let may_be = match common {
-                0 => are_solid && (is_one || has_cavities),
+                // Of solids alone.
+                0 => are_crossed && (is_one() || has_cavities),
                 1 => true,
                 _ => false,
             };
