@@ -59,7 +59,16 @@ pub struct RowReceiver {
 
 /// A queue for rows with so many bodies each.
 pub fn row_queue(bodies: usize) -> (RowSender, RowReceiver) {
-    row_queue_of(ROW_QUEUE, if bodies > MANY { BODY_QUEUE_OF_MANY } else { BODY_QUEUE }, bodies)
+    row_queue_of(ROW_QUEUE, most_waiting(bodies), bodies)
+}
+
+/// The same for a thread that may meet page faults: what never waits takes no memory.
+pub fn untouched_row_queue(bodies: usize) -> (RowSender, RowReceiver) {
+    untouched_row_queue_of(ROW_QUEUE, most_waiting(bodies), bodies)
+}
+
+fn most_waiting(bodies: usize) -> usize {
+    if bodies > MANY { BODY_QUEUE_OF_MANY } else { BODY_QUEUE }
 }
 
 /// A queue for so many rows with so many bodies each, and for no more of those, if they have changed, than `most` of all rows
@@ -72,7 +81,7 @@ pub fn row_queue_of(places: usize, most: usize, bodies: usize) -> (RowSender, Ro
     (sender, receiver)
 }
 
-/// The same for a thread that may meet page faults: what never waits takes no memory.
+/// The same, as [`untouched_row_queue`].
 pub fn untouched_row_queue_of(places: usize, most: usize, bodies: usize) -> (RowSender, RowReceiver) {
     let (rows, row_ends) = RingBuffer::new(places);
     let (bodies_in, bodies_out) = RingBuffer::new((places * bodies).min(most.max(2 * bodies)));

@@ -19,7 +19,7 @@ use crate::record::destination::RunFormat;
 use crate::record::{About, Backpressure, Files, Recorded, View, shows_scene};
 use crate::report::{Report, recording_line};
 use crate::rig::{HandMode, Rig, RigError};
-use crate::row_queue::row_queue;
+use crate::row_queue::{row_queue, untouched_row_queue};
 use crate::shown::Shown;
 use crate::slow::{SlowEnd, SlowSide};
 use crate::snapshots::{Snapshots, Wanted};
@@ -203,7 +203,8 @@ impl Parts {
         .unzip();
         let others = desk.as_ref().map(Desk::scenes_to_come).unwrap_or_default();
         plan.check_outputs(&others)?;
-        let (producer, consumer) = row_queue(step.bodies().len());
+        let make = if clock == ClockMode::Real { row_queue } else { untouched_row_queue };
+        let (producer, consumer) = make(step.bodies().len());
         let pictures = plan.pictures.iter().flat_map(|wanted| &wanted.shots).map(|shot| &shot.file);
         let files = Files {
             record: plan.record.clone(),
