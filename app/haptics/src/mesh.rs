@@ -22,7 +22,6 @@
 //! # Ok::<(), haptics::mesh::MeshError>(())
 //! ```
 
-mod bends;
 mod beside;
 mod build;
 mod bvh;
@@ -67,7 +66,6 @@ mod walk;
 mod weld;
 mod winding;
 
-pub use bends::{MOST_STANDS, Stand};
 #[cfg(test)]
 pub(crate) use bvh::POPPED;
 pub(crate) use bvh::TooMany;
@@ -86,7 +84,6 @@ pub use soup::TriangleSoup;
 pub use uv::CornerUv;
 pub use walk::MAX_FEATURE_CHANGES;
 
-use bends::Bends;
 use extremes::Extremes;
 use nalgebra::Vector3;
 use std::fmt;
@@ -120,8 +117,6 @@ pub struct Mesh {
     labels: Option<Box<[u16]>>,
     /// Vertices that lie farthest out, if somebody has asked for them.
     extremes: OnceLock<Extremes>,
-    /// How much its vertices stick out, if somebody has asked for it.
-    bends: OnceLock<Bends>,
 }
 
 /// From where a mesh, or a part of it that hangs together by edges, can be felt.

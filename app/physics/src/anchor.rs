@@ -40,8 +40,6 @@ pub struct Anchor {
     pub(crate) pressed_m: f64,
     /// Which part of a spring it is.
     pub(crate) share: f64,
-    /// How many springs it is, along the normal and across it.
-    pub(crate) springs: f64,
     /// Stretches of its springs when the last tick ended, along the normal, across it and in turning \[m^2\], squared:
     /// what the forces have worked against.
     pub(crate) worked: [f64; 3],
@@ -101,14 +99,14 @@ impl Anchor {
         X_WB.rotation * self.stretch
     }
 
-    /// How far the point has been dragged \[m^2\], squared, of all springs.
+    /// How far the point has been dragged \[m^2\], squared.
     pub(crate) fn stretch_squared(&self) -> f64 {
-        self.springs * self.stretch.norm_squared()
+        self.stretch.norm_squared()
     }
 
-    /// Lets go of a part of the stretch: what is left of its square, of all springs.
+    /// Lets go of a part of the stretch: what is left of its square.
     pub(crate) fn slacken(&mut self, squared: f64) {
-        let was = self.stretch_squared();
+        let was = self.stretch.norm_squared();
         self.stretch *= if was > 0.0 { (squared / was).sqrt() } else { 0.0 };
     }
 
@@ -144,8 +142,7 @@ impl Anchor {
 
     /// Depth that its spring was pressed by when the last tick ended \[m\].
     pub(crate) fn worked_m(&self) -> f64 {
-        let parts = self.share * self.springs;
-        if parts > 0.0 { (self.worked[0] / parts).sqrt() } else { 0.0 }
+        if self.share > 0.0 { (self.worked[0] / self.share).sqrt() } else { 0.0 }
     }
 
     pub(crate) fn held(&self) -> Held {
@@ -180,8 +177,8 @@ impl Anchor {
         let pressed_m = (self.pressed_m - n.dot(moved_W)).max(0.0);
         let dragged_W = self.stretch_W(X_WB) + moved_W - n * n.dot(moved_W);
         let is_dragged = normal_n > 0.0;
-        self.worked[0] = self.springs * self.share * pressed_m * pressed_m;
-        self.worked[1] = if is_dragged { self.springs * dragged_W.norm_squared() } else { 0.0 };
+        self.worked[0] = self.share * pressed_m * pressed_m;
+        self.worked[1] = if is_dragged { dragged_W.norm_squared() } else { 0.0 };
         self.held = match row.held {
             Held::Slip if normal_n > 0.0 && is_caught(row, normal_n) => Held::Stick,
             Held::Slip if normal_n == 0.0 => Held::Stick,

@@ -86,9 +86,6 @@ pub struct ContactPoint {
     pub gap_m: f64,
     /// Which part of its depth counts: less than 1 where it is next to other points.
     pub share: f64,
-    /// So many springs and dampers stand there, along the normal and across it: 1, but of a mesh on soft points what of them is
-    /// the vertex's.
-    pub springs: f64,
 }
 
 impl ContactPoint {

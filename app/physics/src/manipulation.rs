@@ -188,9 +188,6 @@ impl Manipulation {
             {
                 mesh.find_extremes();
             }
-            if let Shape::Mesh(mesh) = &entity.shape {
-                mesh.find_bends();
-            }
         }
         let count = bodies.len();
         let places = count + MAX_DRIVEN;

@@ -257,16 +257,16 @@ impl Pair {
             }
             is_let_out |= anchor.granted_m > 0.0;
             anchor.pressed_m = if point.gap_m < 0.0 { depth_m - anchor.granted_m } else { -point.gap_m };
-            (anchor.share, anchor.springs) = (point.share, point.springs);
+            anchor.share = point.share;
             let first = SPRINGS_OF_POINT * at;
             let [dragged, turned] = [anchor.stretch_squared(), anchor.turned_squared()];
             springs[first + 1] = Stretched { found: dragged, worked: anchor.worked[1] };
             springs[first + 2] = Stretched { found: turned, worked: anchor.worked[2] };
             full += dragged + turned;
             if has_springs {
-                let found = point.springs * point.share * anchor.pressed_m.max(0.0).powi(2);
+                let found = point.share * anchor.pressed_m.max(0.0).powi(2);
                 springs[first] = Stretched { found, worked: anchor.worked[0] };
-                full += point.springs * point.share * depth_m * depth_m;
+                full += point.share * depth_m * depth_m;
             }
         }
         let full_j = 0.5 * k * full;
@@ -358,18 +358,13 @@ impl Pair {
     }
 
     /// Part of a row's force that is a spring's: along the normal impulses are no springs', and those of an impact not across it either.
-    fn of_spring_W(&self, (anchor, row): (&Anchor, &Row)) -> Vector3<f64> {
-        let is_spring = self.is_of_springs(anchor, row);
+    fn of_spring_W(&self, row: &Row) -> Vector3<f64> {
+        let is_spring = row.stiffness[1] == self.surfacing.stiffness_n_per_m;
         match (is_spring, self.surfacing.response.has_springs()) {
             (true, true) => row.force_W,
             (true, false) => row.force_W - row.normal_W * row.normal_W.dot(&row.force_W),
             (false, _) => Vector3::zeros(),
         }
-    }
-
-    /// True of a row whose springs have not been taken away for an impact.
-    fn is_of_springs(&self, anchor: &Anchor, row: &Row) -> bool {
-        row.stiffness[1] == self.surfacing.stiffness_n_per_m * anchor.springs
     }
 
     /// Work of its impulses, by the velocities that they left (J), negative: taken from the bodies; and a body of it that moves.
@@ -379,11 +374,8 @@ impl Pair {
             return None;
         }
         let body = self.moving(end).into_iter().flatten().next()?;
-        let put_in_w = |(anchor, row): (&Anchor, &Row)| {
-            (row.force_W - self.of_spring_W((anchor, row))).dot(&velocity(row, end.motions))
-        };
-        let own = self.anchors.iter().zip(self.rows(end.rows));
-        Some((body, own.map(put_in_w).sum::<f64>() * end.dt_s))
+        let put_in_w = |row: &Row| (row.force_W - self.of_spring_W(row)).dot(&velocity(row, end.motions));
+        Some((body, self.rows(end.rows).iter().map(put_in_w).sum::<f64>() * end.dt_s))
     }
 
     /// Those of its bodies that anything moves.
@@ -404,15 +396,15 @@ impl Pair {
         for (anchor, (at, row)) in self.anchors.iter_mut().zip(own) {
             anchor.approached |= has_met(at);
             let velocity_W = velocity(row, end.motions);
-            if row.stiffness[1] != stiffness_n_per_m * anchor.springs {
+            if row.stiffness[1] != stiffness_n_per_m {
                 // An impact lets go of what friction had stretched.
                 anchor.release();
             }
             anchor.settle(row, &(velocity_W * end.dt_s), X_WB);
             turning::settle(row, anchor, &(spin_W(row, end.motions) * end.dt_s), X_WB);
         }
-        for (anchor, row) in self.anchors.iter().zip(self.rows(end.rows)) {
-            let force_W = self.of_spring_W((anchor, row));
+        for row in self.rows(end.rows) {
+            let force_W = self.of_spring_W(row);
             presses |= force_W != Vector3::zeros();
             worked_j += force_W.dot(&velocity(row, end.motions)) * end.dt_s;
             worked_j += row.torque_W().dot(&spin_W(row, end.motions)) * end.dt_s;

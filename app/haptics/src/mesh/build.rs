@@ -126,7 +126,6 @@ impl Mesh {
             uv: None,
             labels: None,
             extremes: OnceLock::new(),
-            bends: OnceLock::new(),
         };
         must_roll |= mesh.note_sealed(&parts, &mut report);
         report.crossed = mesh.mark_crossed(&parts, must_roll);

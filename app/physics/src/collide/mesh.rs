@@ -129,8 +129,6 @@ pub(super) struct Contact {
     pub(super) gap_m: f64,
     /// Which part of its depth that is.
     pub(super) share: f64,
-    /// How many springs stand there.
-    pub(super) springs: f64,
     /// It was one of its place's in the last tick.
     pub(super) carried: bool,
 }
@@ -145,7 +143,6 @@ impl Contact {
             normal_M,
             gap_m,
             share: 1.0,
-            springs: 1.0,
             carried: false,
         }
     }
@@ -153,19 +150,12 @@ impl Contact {
 
 impl Told<'_> {
     pub(super) fn tell(&mut self, contact: &Contact) {
-        let Contact { id, on_mesh_M, on_other_M, normal_M, gap_m, share, springs, .. } = *contact;
+        let Contact { id, on_mesh_M, on_other_M, normal_M, gap_m, share, .. } = *contact;
         let (point_M, sign) = if self.mesh_is_a { (on_mesh_M, -1.0) } else { (on_other_M, 1.0) };
         let point_W = (self.X_WM * Point3::from(point_M)).coords;
         let (gap_m, share) =
             if gap_m < 0.0 { (gap_m * self.part, share * self.part) } else { (gap_m, share) };
-        self.found.push(ContactPoint {
-            id,
-            point_W,
-            normal_W: self.X_WM * normal_M * sign,
-            gap_m,
-            share,
-            springs,
-        });
+        self.found.push(ContactPoint { id, point_W, normal_W: self.X_WM * normal_M * sign, gap_m, share });
     }
 }
 

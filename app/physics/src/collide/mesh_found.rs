@@ -96,7 +96,7 @@ impl Found {
         };
         let there = self.contacts[..self.count].iter().enumerate().position(is_there);
         contact.carried = self.carried.contains(&contact.id);
-        contact.id = named(self.patch, contact.id);
+        contact.id |= (self.patch as u32) << PATCH_SHIFT;
         if let Some(there) = there {
             // Of two right above each other the lower one presses: of both rims of a coin. Of two edges of one crossing the one
             // that did in the last tick: by turns they would push in two directions.
@@ -115,7 +115,7 @@ impl Found {
     /// Whatever is near it.
     pub(super) fn push_apart(&mut self, mut contact: Contact) {
         contact.carried = self.carried.contains(&contact.id);
-        contact.id = named(self.patch, contact.id);
+        contact.id |= (self.patch as u32) << PATCH_SHIFT;
         self.add(contact);
     }
 
@@ -167,11 +167,6 @@ impl Found {
             self.begins.iter_mut().filter(|begin| **begin > least).for_each(|begin| *begin -= 1);
         }
     }
-}
-
-/// Name of a contact of a place.
-pub(super) fn named(place: usize, name: u32) -> u32 {
-    (place as u32) << PATCH_SHIFT | name
 }
 
 /// The place that a contact is of, and what it is called there.

@@ -99,25 +99,6 @@ impl Patches {
         first.is_known.then_some(one)
     }
 
-    /// True if several are pressed, and go over into each other: in about one direction, and none a step above another one.
-    pub(super) fn go_on(&self) -> bool {
-        let pressed = || self.all.iter().filter(|patch| patch.is_pressed());
-        let goes_on = |one: &Patch, next: &Patch| {
-            let agrees = one.normal_M.dot(&next.normal_M);
-            agrees > SAME && (agrees < PARALLEL || one.is_same(&next.normal_M, &next.at_M, false))
-        };
-        pressed().count() > 1 && pressed().all(|one| pressed().all(|next| goes_on(one, next)))
-    }
-
-    /// Those that one place has to be told from: all but what looks as it does. In a bowl one goes over into the next.
-    pub(super) fn seen_from(&self, number: usize) -> Self {
-        let (own_M, mut seen) = (self.all[number].normal_M, *self);
-        for (at, patch) in seen.all.iter_mut().enumerate() {
-            patch.is_known &= at == number || patch.normal_M.dot(&own_M) < SAME;
-        }
-        seen
-    }
-
     /// Whether a normal is another place's rather than this one's.
     pub(super) fn belongs_elsewhere(&self, number: usize, normal_M: &Vector3<f64>) -> bool {
         let agrees = self.all[number].normal_M.dot(normal_M);
@@ -191,8 +172,6 @@ impl Patches {
 
 /// Cosine between normals of one place.
 const SAME: f64 = 0.9;
-/// The same, of planes that are parallel.
-const PARALLEL: f64 = 1.0 - 1e-4;
 /// Places of one normal are two if so far apart along it \[m\].
 const APART_M: f64 = 1e-3;
 /// Cosine between a place's normal and that of a point there, beyond which it is nobody else's.

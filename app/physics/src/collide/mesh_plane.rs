@@ -9,7 +9,7 @@ use nalgebra::{Isometry3, Vector3};
 use super::mesh::{About, Contact, Told, bounding_ball};
 use super::mesh_corner::Corner;
 use super::mesh_span::Standing;
-use super::mesh_spread::{How, Lows, MOST_VERTICES};
+use super::mesh_spread::Lows;
 use super::{MAX_POINTS, PairMemory, mesh_spread};
 
 /// The plane that such a mesh can only stand on, in the other one's frame: that of a plane, or, where contacts are soft, of a box's
@@ -58,10 +58,9 @@ pub(super) fn contact_points(
             let about = About::Vertex(corner.vertex(mesh));
             Some(Contact::new(about, *corner.point_M(mesh), -normal_M, standing.height_m(corner)))
         };
-        lows.find(&standing, |corner| corner.is_bent_here(mesh), see)
+        lows.find(&standing, |_| true, see)
     };
-    let how = How { room: MAX_POINTS, most: MOST_VERTICES, ahead_m: standing.travel_m };
-    if memory.is_soft && mesh_spread::tell(spread, &how, find, |contact| told.tell(contact)) {
+    if memory.is_soft && mesh_spread::tell(spread, MAX_POINTS, find, |contact| told.tell(contact)) {
         return;
     }
     for corner in standing.choose(&mut memory.patches.all[0].stands[0]).into_iter().flatten() {

@@ -39,7 +39,6 @@ use super::mesh_patch::{MAX_PATCHES, Patch, Patches};
 use super::mesh_search::look_around;
 use super::mesh_see::{Seen, Side, see, see_side};
 use super::mesh_span::Standing;
-use super::mesh_springs::tell_springs;
 
 pub(super) fn contact_points(
     mesh: &Mesh,
@@ -85,15 +84,13 @@ pub(super) fn contact_points(
     let stands = told.mesh_is_a || !memory.is_b_fixed || matches!(other.solid, Solidity::Mesh(_));
     let (is_soft, mut spread) = (memory.is_soft && stands, patches.spread);
     spread.set_crowded(is_soft);
-    let one = patches.as_one();
-    let are_springs = is_soft && (one.is_some() || patches.go_on());
-    let merged = one.unwrap_or(*patches);
-    let seen = std::array::from_fn::<_, MAX_PATCHES, _>(|number| merged.seen_from(number));
-    let places = (0..MAX_PATCHES).filter(|&number| merged.all[number].is_known).map(|number| {
-        let meeting = Meeting::of(&merged.all[number], reach_m, travel_m);
-        Place { mesh, other, meeting, number, patches: &seen[number], places: &merged, touch: touch.as_ref() }
+    let one = if is_soft { patches.as_one() } else { None };
+    let is_told = one.is_some_and(|one| {
+        let meeting = Meeting::of(&one.all[0], reach_m, travel_m);
+        let place = Place { mesh, other, meeting, number: 0, patches: &one, touch: touch.as_ref() };
+        place.tell_springs(found.all(), &mut spread, told)
     });
-    if !are_springs || !tell_springs(&places, found.all(), &mut spread, told) {
+    if !is_told {
         found.all().iter().for_each(|contact| told.tell(contact));
     }
     patches.spread = spread;
@@ -115,7 +112,7 @@ fn find(
         if patches.all[number].is_known {
             let meeting = Meeting::of(&patches.all[number], reach_m, travel_m);
             let mut stands = patches.all[number].stands;
-            let place = Place { mesh, other, meeting, number, patches, places: patches, touch };
+            let place = Place { mesh, other, meeting, number, patches, touch };
             place.vertices(&mut stands[0], &mut found);
             place.owns(&mut stands[1], &mut found);
             place.touch(&mut found);
@@ -208,19 +205,11 @@ pub(super) struct Place<'m> {
     pub(super) other: &'m Other<'m>,
     pub(super) meeting: Meeting,
     number: usize,
-    /// Those that it has to be told from, and itself.
     pub(super) patches: &'m Patches,
-    /// All of them.
-    pub(super) places: &'m Patches,
     touch: Option<&'m Touch>,
 }
 
 impl Place<'_> {
-    /// Which of all it is.
-    pub(super) fn number(&self) -> usize {
-        self.number
-    }
-
     /// The mesh's vertices against the other one.
     fn vertices(&self, stands: &mut super::Stands, found: &mut Found) {
         let (height, limits) = self.limits_of_mesh(self.beside_m(self.mesh));

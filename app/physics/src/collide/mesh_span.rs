@@ -25,7 +25,6 @@
 //! tick that of another role looks at more, D's among them: a bump between others is no neighbour of theirs.
 
 use haptics::mesh::Linear;
-use nalgebra::Vector3;
 
 use super::mesh_corner::Corner;
 use super::mesh_role::{CROWDED, FIRST, How, LATER, MANY_VISITS, Seek};
@@ -93,11 +92,6 @@ impl Standing<'_> {
         };
         let are_few = self.for_each_low(see, MANY_VISITS);
         are_few.then_some(all)
-    }
-
-    /// True within reach and limits.
-    pub(super) fn is_low(&self, point_M: &Vector3<f64>) -> bool {
-        self.height.at(point_M) <= self.reach_m && self.limits.iter().all(|limit| limit.at(point_M) >= 0.0)
     }
 
     /// Visits all within reach, each as often as faces meet there, until `visit` says `false` or there is too much to look at; says

@@ -49,7 +49,7 @@ pub(super) struct Leaver {
 }
 
 /// What a place in a queue takes \[bytes\]: of a cube on a floor four go, and an end.
-const MOST_BYTES: usize = 400;
+const MOST_BYTES: usize = 384;
 const _: () = assert!(size_of::<Parcel>() <= MOST_BYTES);
 
 impl Parcel {

@@ -35,7 +35,7 @@ pub(super) fn row(
         arms_W[0] -= apart_W * 0.5;
         arms_W[1] += apart_W * 0.5;
     }
-    let k = surfacing.stiffness_n_per_m * anchor.springs;
+    let k = surfacing.stiffness_n_per_m;
     let gap_m = -anchor.pressed_m;
     let n = point.normal_W;
     let mut row = Row {
@@ -59,8 +59,8 @@ pub(super) fn row(
     let gives_per_kg = if is_asked_for { gives_per_kg(&row, start) } else { 0.0 };
     row.damping = row.stiffness.map(|k| surfacing.damping.n_s_per_m(k, gives_per_kg));
     if !surfacing.damping.is_ratio() {
-        // As many dampers as springs.
-        row.damping = row.damping.map(|damping| damping * anchor.springs);
+        // A point that stands for many has the dampers of all.
+        row.damping[0] *= anchor.share.max(1.0);
     }
     let [b, b_across] = row.damping;
     // So large that velocities are what is wanted. Nothing can be stopped that nothing moves.

@@ -316,22 +316,16 @@ fn stacks_that_begin_at_rest_as_felt_stay_where_they_are() {
 
 /// Upright along z.
 fn can(sides: u32) -> Arc<Mesh> {
-    can_of(&even(sides))
-}
-
-/// Of corners at these angles.
-fn can_of(angles: &[f64]) -> Arc<Mesh> {
-    let outline: Vec<[f64; 2]> = angles.iter().map(|a| [0.03 * a.cos(), 0.03 * a.sin()]).collect();
-    let triangles: Vec<[u32; 3]> = (1..angles.len() as u32 - 1).map(|side| [0, side, side + 1]).collect();
+    let corner = |side: u32| {
+        let angle = TAU * f64::from(side) / f64::from(sides);
+        [0.03 * angle.cos(), 0.03 * angle.sin()]
+    };
+    let outline: Vec<[f64; 2]> = (0..sides).map(corner).collect();
+    let triangles: Vec<[u32; 3]> = (1..sides - 1).map(|side| [0, side, side + 1]).collect();
     meshes::build(meshes::prism(&outline, &triangles, 0.08))
 }
 
-/// Angles of so many corners.
-fn even(sides: u32) -> Vec<f64> {
-    (0..sides).map(|side| TAU * f64::from(side) / f64::from(sides)).collect()
-}
-
-/// On a plane and on a box, dropped flat and on their sides.
+/// On a plane and on a box, dropped flat and on their sides. Of the finest not all vertices have room: it rocks before it rests.
 #[test]
 fn round_meshes_as_felt_stand_and_lie_where_they_fall() {
     let settings = settings(ContactStiffness::AsFelt);
@@ -359,34 +353,12 @@ fn round_meshes_as_felt_stand_and_lie_where_they_fall() {
             }
         }
     }
-}
-
-/// Which vertices a foot was cut into is nothing that a hand could feel: all rest as a box does, on four springs.
-#[test]
-fn cans_as_felt_rest_as_deep_and_upright_however_they_are_cut() {
-    let settings = settings(ContactStiffness::AsFelt);
-    let is_left = |a: &f64| *a < PI || (a / TAU * 80.0).round() % 5.0 == 0.0;
-    let uneven: Vec<f64> = even(80).into_iter().filter(is_left).collect();
-    let expected_m = 0.3 * G / (4.0 * 500.0);
-    for (name, support, x) in supports() {
-        for angles in [even(5), even(48), uneven.clone(), even(1000), even(3000)] {
-            let up = UnitQuaternion::from_axis_angle(&Vector3::x_axis(), -FRAC_PI_2);
-            let at = Isometry3::from_parts(Vector3::new(x, 0.042, 0.0).into(), up);
-            let can = object(can_of(&angles), at, 1000.0, 0.5).with_damping(10.0).unwrap();
-            let mut table = Table::new(vec![(can, 0.3)], settings, 1000.0);
-            table.entities[0] = support.clone();
-            table.run(1.0);
-            let (sides, pose) = (angles.len(), &table.entities[1].X_WB);
-            let leans = (pose.rotation * Vector3::z()).angle(&Vector3::y());
-            let deep_m = 0.04 - pose.translation.y;
-            assert!((deep_m / expected_m - 1.0).abs() < 1e-3, "{name} {sides}: {deep_m} of {expected_m}");
-            // Where all corners count and are alike, it does not lean. Those that stand for others have their middle beside that of
-            // all by a hundredth of a segment of theirs; uneven ones that of their bends beside that of the outline.
-            let leans_most = if sides == 5 || angles == even(48) { 1e-6 } else { 6e-4 };
-            assert!(leans < leans_most, "{name} {sides}: {leans} rad");
-            assert!(table.body(0).velocity_W.norm() < 1e-5, "{name} {sides}");
-        }
-    }
+    let turn = UnitQuaternion::from_axis_angle(&Vector3::x_axis(), -FRAC_PI_2);
+    let at = Isometry3::from_parts(Vector3::new(0.0, 0.042, 0.0).into(), turn);
+    let mut finest = Table::new(vec![(object(can(3000), at, 1000.0, 0.5), 0.3)], settings, 1000.0);
+    finest.run(6.0);
+    let leans = (finest.entities[1].X_WB.rotation * Vector3::z()).angle(&Vector3::y());
+    assert!(leans.min(PI - leans) < 0.1 && finest.body(0).velocity_W.norm() < 1e-3, "{leans}");
 }
 
 /// Stand-in for a floor: its top is at height 0, and things come down there at this x.
@@ -415,9 +387,7 @@ fn round_meshes_as_felt_stand_on_rims_cylinders_and_meshes() {
         {
             let up = UnitQuaternion::from_axis_angle(&Vector3::x_axis(), lean - FRAC_PI_2);
             let at = Isometry3::from_parts(Vector3::new(x, 0.0435, 0.0).into(), up);
-            // What it rocks by dies away as fast as its dampers take it: four, at any number of sides.
-            let can = object(can(sides), at, 1000.0, 0.5).with_damping(10.0).unwrap();
-            let mut table = Table::new(vec![(can, 0.3)], settings, rate_hz);
+            let mut table = Table::new(vec![(object(can(sides), at, 1000.0, 0.5), 0.3)], settings, rate_hz);
             table.entities[0] = support.clone();
             let energy_j = |table: &Table| {
                 let body = table.body(0);
@@ -464,49 +434,6 @@ fn balls_of_triangles_as_felt_roll_as_far_on_cylinders_and_meshes() {
         let found_m = way_m(Some(support));
         // On a fine sheet it is braked by a tenth: where more than one place is known, few vertices stand for all for a while.
         assert!((found_m / expected_m - 1.0).abs() < 0.12, "{name}: {found_m} of {expected_m}");
-    }
-}
-
-/// As many vertices as touch bear what four springs bear: a ball of triangles sinks in, and so rolls, as any other one does.
-#[test]
-fn balls_of_triangles_as_felt_roll_as_far_however_finely_they_are_cut() {
-    let settings = settings(ContactStiffness::AsFelt);
-    let way_m = |nu: usize, nv: usize| {
-        let ball = meshes::build(haptics::mesh::make::uv_sphere(nu, nv, 0.03));
-        let turn = UnitQuaternion::from_scaled_axis(Vector3::new(0.4, 0.5, -0.7));
-        let at = Isometry3::from_parts(Vector3::new(-0.2, 0.03, 0.0).into(), turn);
-        let mut table = Table::new(vec![(object(ball, at, 1000.0, 0.5), 0.3)], settings, 1000.0);
-        let moving = table.body(0).moving(Vector3::x() * 0.3, Vector3::z() * -10.0);
-        table.manipulation = Manipulation::new(&table.entities, &[(1, moving)], settings).unwrap();
-        table.run(2.0);
-        (table.entities[1].X_WB.translation.x + 0.2, table.entities[1].X_WB.translation.y)
-    };
-    let ways = [(48, 24), (96, 48), (200, 100), (400, 200)].map(|(nu, nv)| way_m(nu, nv));
-    let (first_m, height_m) = ways[0];
-    for (way_m, y) in ways {
-        // Of facets of 4 mm and less, a few hundredths of what it goes and sinks in.
-        assert!((way_m / first_m - 1.0).abs() < 0.04, "{ways:?}");
-        assert!(((0.03 - y) / (0.03 - height_m) - 1.0).abs() < 0.03, "{ways:?}");
-    }
-}
-
-/// A can whose rim is all around in a bowl, of which places go over into each other.
-#[test]
-fn round_meshes_as_felt_rest_in_bowls() {
-    let settings = settings(ContactStiffness::AsFelt);
-    let bowl = meshes::build(meshes::terrain(64, 0.6, |x, z| 2.0 * (x * x + z * z)));
-    for (sides, rate_hz) in [(24, 1000.0), (48, 1000.0), (48, 4000.0)] {
-        let up = UnitQuaternion::from_axis_angle(&Vector3::x_axis(), -FRAC_PI_2);
-        let at = Isometry3::from_parts(Vector3::new(0.0, 0.042, 0.0).into(), up);
-        let can = object(can(sides), at, 1000.0, 0.5).with_damping(10.0).unwrap();
-        let mut table = Table::new(vec![(can, 0.3)], settings, rate_hz);
-        table.entities[0] = object(Shape::from(bowl.clone()), Isometry3::identity(), 1000.0, 0.5);
-        table.run(2.0);
-        let leans = (table.entities[1].X_WB.rotation * Vector3::z()).angle(&Vector3::y());
-        let turns = table.body(0).angular_velocity_W().norm();
-        // A tenth of a degree: facets of 9 mm are aslant by two.
-        assert!(leans < 2e-3, "{sides} {rate_hz}: {leans} rad");
-        assert!(turns < 1e-3, "{sides} {rate_hz}: {turns} rad/s");
     }
 }
 
