@@ -28,6 +28,7 @@ mod crowd;
 mod csg_cone;
 mod curved;
 mod detour;
+mod endless;
 mod facets;
 mod feet;
 mod flatten;
@@ -57,6 +58,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use nalgebra::Vector3;
 
 use cells::Cells;
+use endless::Reach;
 use flatten::Flat;
 use patch::Patch;
 
@@ -72,6 +74,8 @@ pub struct Csg {
     /// The same, by place.
     cells: Cells,
     extent_m: f64,
+    /// Nothing of it has a coordinate larger than that.
+    has_end: bool,
     /// Of all solids that this process has built, which.
     identity: u64,
 }
@@ -98,10 +102,19 @@ impl Csg {
     /// Errors: a tree without parts, too large or too deep, a pose or scale that is not finite, a leaf that is no
     /// simple form.
     pub fn build(tree: &CsgTree) -> Result<Self, CsgError> {
-        let Flat { patches, items, steps, extent_m } = flatten::flatten(tree)?;
+        let solid = Self::of(flatten::flatten(tree, 0.0)?);
+        // Of planes alone nobody knows before how far they reach.
+        let Reach { farthest_m, has_end } = solid.reach();
+        let solid =
+            if farthest_m > solid.extent_m { Self::of(flatten::flatten(tree, farthest_m)?) } else { solid };
+        Ok(Self { has_end, ..solid })
+    }
+
+    fn of(flat: Flat) -> Self {
+        let Flat { patches, items, steps, extent_m } = flat;
         let identity = BUILT.fetch_add(1, Ordering::Relaxed);
         let cells = Cells::build(&patches, &items, &steps, extent_m);
-        Ok(Self { patches, items, steps, cells, extent_m, identity })
+        Self { patches, items, steps, cells, extent_m, has_end: false, identity }
     }
 
     /// A bound of the distance to the boundary, negative inside; exact in sign and zero, and never larger than the
@@ -163,6 +176,11 @@ impl Csg {
     /// Largest coordinate of its bounded leaves, without its sign (m): what rounding errors are measured by.
     pub fn extent_m(&self) -> f64 {
         self.extent_m
+    }
+
+    /// Whether nothing of it has a coordinate larger than [`Self::extent_m`]; of planes that seem to go on for ever: no.
+    pub fn has_end(&self) -> bool {
+        self.has_end
     }
 
     /// Nearer to a patch than this is on it (m).

@@ -145,18 +145,8 @@ impl SeenMeshes {
 
 /// `None`: it is not drawn because it has no end.
 fn undrawn(csg: &Csg) -> Option<Remainder> {
-    has_an_end(csg).then(|| Remainder::of(csg))
+    csg.has_end().then(|| Remainder::of(csg))
 }
-
-/// It has nothing far away from where it is described.
-fn has_an_end(csg: &Csg) -> bool {
-    let far_m = FAR * csg.extent_m().max(1.0);
-    let ways = [Vector3::x(), Vector3::y(), Vector3::z()].into_iter().flat_map(|way| [way, -way]);
-    !ways.into_iter().any(|way| csg.is_inside(&(way * far_m)))
-}
-
-/// Extents away, where only what has no end is.
-const FAR: f64 = 1e3;
 
 /// Of a thing's length.
 const ROUNDING: f64 = 1e-9;

@@ -51,42 +51,6 @@ impl Csg {
     }
 }
 
-/// Largest coordinate of a corner of the solid in which three planes of leaves without an end meet; 0 where there is none.
-fn farthest_corner_m(csg: &Csg) -> f64 {
-    let endless = csg.steps.iter().filter_map(|step| match *step {
-        super::Step::Leaf { radius_m: f64::INFINITY, first, count, .. } => Some((first, count)),
-        _ => None,
-    });
-    let items = endless.flat_map(|(first, count)| &csg.items[first as usize..(first + count) as usize]);
-    let mut numbers: Vec<u16> = items.map(|item| item.patch).collect();
-    numbers.sort_unstable();
-    numbers.dedup();
-    let planes = numbers.iter().filter_map(|number| match csg.patches[usize::from(*number)] {
-        Patch::Plane { normal_B, offset_m } => Some((normal_B, offset_m)),
-        Patch::Curved(_) => None,
-    });
-    let planes: Vec<_> = planes.take(MOST_PLANES).collect();
-    let mut farthest_m = 0.0_f64;
-    for (a, (normal_a, offset_a)) in planes.iter().enumerate() {
-        for (b, (normal_b, offset_b)) in planes[..a].iter().enumerate() {
-            let line = normal_a.cross(normal_b);
-            for (normal_c, offset_c) in &planes[..b] {
-                let volume = line.dot(normal_c);
-                let corner = (normal_b.cross(normal_c) * *offset_a
-                    + normal_c.cross(normal_a) * *offset_b
-                    + line * *offset_c)
-                    / volume;
-                let far_m = corner.amax();
-                let is_near = far_m <= FARTHEST * csg.extent_m;
-                if is_near && csg.signed_distance(&corner).abs() <= CORNER * csg.extent_m.max(far_m) {
-                    farthest_m = farthest_m.max(far_m);
-                }
-            }
-        }
-    }
-    farthest_m
-}
-
 fn triangles(pieces: &[Piece]) -> usize {
     pieces.iter().map(|piece| piece.polygon.corners.len() - 2).sum()
 }
@@ -123,7 +87,7 @@ impl OfTree for Step {
 
 impl Solid {
     fn of(csg: &Csg) -> Self {
-        let half_m = REACH * csg.extent_m.max(farthest_corner_m(csg));
+        let half_m = REACH * csg.extent_m;
         let around_cube = (Vector3::zeros(), half_m * 3f64.sqrt());
         let (mut balls, mut steps) = (Vec::new(), Vec::new());
         for step in &csg.steps {
@@ -261,12 +225,6 @@ const FINEST: usize = 64;
 const COARSEST: usize = 12;
 /// Of the extent: half the cube that holds all bounded parts; a cube that is not round numbers meets no face edge-on.
 const REACH: f64 = 1.0173;
-/// Planes without an end whose corners are sought.
-const MOST_PLANES: usize = 64;
-/// Of the extent: corners beyond are of planes that are all but parallel.
-const FARTHEST: f64 = 1e3;
-/// Of the extent: so near to the boundary a corner is one of its own.
-const CORNER: f64 = 1e-9;
 /// Of the extent: nearer surfaces are one (as in [`flatten`](super::flatten)).
 const ON: f64 = 1e-11;
 /// Triangles are no more, unless the coarsest steps make more.

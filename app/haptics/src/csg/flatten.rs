@@ -34,8 +34,9 @@ struct Map {
     shift_B: Vector3<f64>,
 }
 
-pub(super) fn flatten(tree: &CsgTree) -> Result<Flat, CsgError> {
-    let mut flattening = Flattening::default();
+/// Its parts; the extent is at least so much (m).
+pub(super) fn flatten(tree: &CsgTree, least_m: f64) -> Result<Flat, CsgError> {
+    let mut flattening = Flattening { extent_m: least_m, ..Flattening::default() };
     let everything = Map { map: Matrix3::identity(), shift_B: Vector3::zeros() };
     flattening.tree(tree, &everything, 1)?;
     let extent_m = if flattening.extent_m > 0.0 { flattening.extent_m } else { 1.0 };

@@ -311,3 +311,54 @@ fn another_tree_in_the_same_place_is_met_anew() {
     let out = step(&mut finger, &entity, &v(0.0075, 0.02, 0.0));
     assert!((out.god_object_W - v(0.0075, 0.025, 0.0)).norm() < 1e-16, "{out:?}");
 }
+
+/// Five planes, of which four meet so far away and are 10 mm from the middle: only corners tell how far it reaches.
+#[test]
+fn a_needle_of_planes_alone_is_felt_to_its_tip_and_known_to_reach_there() {
+    for length_m in [0.1, 1.0, 10.0] {
+        let side = |angle: f64| {
+            let normal = v(0.0101 / length_m, angle.cos(), angle.sin()).normalize();
+            (normal, normal.x * length_m)
+        };
+        let sides = [0.3, 1.87, 3.44, 5.01].map(side);
+        let wall =
+            |(normal, offset_m)| CsgPart::new(Plane::new(normal, offset_m).unwrap(), Isometry3::identity());
+        let walls = sides.into_iter().chain([(-Vector3::x(), 0.0)]);
+        let tree = CsgTree::intersection(walls.map(wall));
+        let solid = trees::built(&tree);
+        assert!(solid.has_end() && (solid.extent_m() / length_m - 1.0).abs() < 1e-9, "{}", solid.extent_m());
+        // Without its foot it goes on for ever.
+        let open = trees::built(&CsgTree::intersection(sides.map(wall)));
+        assert!(!open.has_end());
+        let needle = touchable(&tree, Friction::None);
+        for share in [0.05, 0.3, 0.6, 0.9, 0.99] {
+            let x = share * length_m;
+            let mut finger = point_finger();
+            for at in 0..=50 {
+                let hip = v(x, 0.02 * (1.0 - f64::from(at) / 50.0) + 1e-4, 0.0);
+                let is_felt = step(&mut finger, &needle, &hip).entity.is_some();
+                let depths = sides.iter().map(|(normal, offset_m)| offset_m - normal.dot(&hip));
+                let depth_m = depths.fold(f64::MAX, f64::min);
+                assert_eq!(is_felt, depth_m > 0.0, "{length_m} m, at {x} m: {depth_m} m deep");
+            }
+        }
+    }
+}
+
+/// Oblique, so that no axis leads into it: it had been taken for as small as its planes are near the middle.
+#[test]
+fn what_goes_on_for_ever_in_any_direction_has_no_end() {
+    let wall = |normal: [f64; 3]| {
+        CsgPart::new(Plane::new(Vector3::from(normal).normalize(), 0.01).unwrap(), Isometry3::identity())
+    };
+    let sides = [[1.0, -1.0, 0.0], [-1.0, 1.0, 0.0], [1.0, 1.0, -2.0], [-1.0, -1.0, 2.0]];
+    // A bar along the diagonal of space; with two ends; with one.
+    let with = |ends: &[[f64; 3]]| {
+        trees::built(&CsgTree::intersection(sides.iter().chain(ends).map(|normal| wall(*normal)))).has_end()
+    };
+    assert!(!with(&[]) && !with(&[[1.0, 1.0, 1.0]]) && with(&[[1.0, 1.0, 1.0], [-1.0, -1.0, -1.0]]));
+    let room = CsgTree::difference([wall([0.0, 1.0, 0.0]), CsgPart::at(cuboid([0.1; 3]), Vector3::zeros())]);
+    assert!(!trees::built(&room).has_end());
+    let cut = CsgTree::difference([CsgPart::at(cuboid([0.1; 3]), Vector3::zeros()), wall([0.0, 1.0, 0.0])]);
+    assert!(trees::built(&cut).has_end());
+}

@@ -1,6 +1,6 @@
 //! Balls around entities: what two of them are asked first.
 
-use haptics::{Csg, Form, Shape};
+use haptics::{Form, Shape};
 use nalgebra::Vector3;
 
 use super::mesh;
@@ -11,7 +11,7 @@ pub fn bounding_ball(shape: &Shape) -> Option<(Vector3<f64>, f64)> {
     match shape {
         Shape::Form(form) => Some((Vector3::zeros(), radius_m(form)?)),
         Shape::Mesh(mesh) => mesh::bounding_ball(mesh),
-        Shape::Csg(csg) => around(csg.extent_m()).filter(|(_, radius_m)| ends(csg, *radius_m)),
+        Shape::Csg(csg) => around(csg.extent_m()).filter(|_| csg.has_end()),
         Shape::Nurbs(nurbs) => around(nurbs.extent_m()),
         Shape::Own(_) => None,
     }
@@ -21,18 +21,6 @@ pub fn bounding_ball(shape: &Shape) -> Option<(Vector3<f64>, f64)> {
 fn around(extent_m: f64) -> Option<(Vector3<f64>, f64)> {
     Some((Vector3::zeros(), extent_m * 3.0_f64.sqrt())).filter(|(_, radius_m)| radius_m.is_finite())
 }
-
-/// Whether there is nothing of it on the axes far outside: a half-space would be met on one of them.
-fn ends(csg: &Csg, radius_m: f64) -> bool {
-    let far_m = FAR * radius_m.max(1.0);
-    (0..6).all(|side| {
-        let away = Vector3::ith(side / 2, if side % 2 == 0 { far_m } else { -far_m });
-        !csg.is_inside(&away)
-    })
-}
-
-/// How many times its bounded leaves' size is far outside of a tree.
-const FAR: f64 = 1e3;
 
 /// Around the origin of the form's frame.
 fn radius_m(form: &Form) -> Option<f64> {
