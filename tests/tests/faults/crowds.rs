@@ -103,7 +103,8 @@ fn cpu_of_service(process: u32) -> f64 {
 }
 
 fn wait_for_state(stand: &Stand, is_fault: bool) {
-    wait_for("what was asked for under a flood", || {
+    let what = if is_fault { "the stop under a flood" } else { "the end of a fault under a flood" };
+    wait_for(what, || {
         let frame = stand.view().read_latest();
         frame.is_some_and(|frame| (frame.state == DriverState::Fault as u64) == is_fault)
     });
