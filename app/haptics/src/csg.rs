@@ -178,7 +178,7 @@ impl Csg {
         self.extent_m
     }
 
-    /// Whether nothing of it has a coordinate larger than [`Self::extent_m`]; of planes that seem to go on for ever: no.
+    /// True if nothing of it has a coordinate larger than [`Self::extent_m`]; of planes that seem to go on for ever false.
     pub fn has_end(&self) -> bool {
         self.has_end
     }

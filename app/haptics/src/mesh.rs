@@ -105,7 +105,7 @@ pub struct Mesh {
     longest_edge_m: f64,
     /// Zero where no sheet crosses or meets anything, and nothing is inverted.
     point_radius_m: f64,
-    /// Whether there are edges of three and more faces, of whatever parts.
+    /// There are edges of three and more faces, of whatever parts.
     has_crowds: bool,
     /// Of a convex solid.
     convex_inner_m: Option<f64>,

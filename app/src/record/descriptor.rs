@@ -36,7 +36,7 @@ pub(super) struct Field {
     pub(super) name: String,
     /// Its type.
     pub(super) kind: Kind,
-    /// How many there may be.
+    /// Number of values that there may be.
     pub(super) label: Label,
 }
 

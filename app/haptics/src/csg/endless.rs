@@ -75,7 +75,7 @@ impl Csg {
         farthest_m
     }
 
-    /// Whether it may go on for ever.
+    /// True if it may go on for ever.
     fn goes_on(&self, planes: &[(Vector3<f64>, f64)]) -> bool {
         let axes = (0..3).map(|axis| Vector3::ith(axis, 1.0));
         let normals: Vec<Vector3<f64>> = planes.iter().map(|(normal, _)| *normal).chain(axes).collect();

@@ -18,7 +18,7 @@ use super::winding::Parts;
 use super::{Face, Mesh};
 
 impl Mesh {
-    /// Whether points must roll, since walks come below faces or into pockets. Closed parts are turned outward by now; without
+    /// True if points must roll, since walks come below faces or into pockets. Closed parts are turned outward by now; without
     /// cavities, different ones together are never inverted.
     pub(super) fn is_inverted(&self, parts: &Parts, has_cavities: bool) -> bool {
         let (mut is_inverted, mut rays) = (false, MOST_RAYS);
@@ -45,7 +45,7 @@ impl Mesh {
         is_inverted
     }
 
-    /// Whether it is inverted in front of two faces that cross there.
+    /// True if it is inverted in front of two faces that cross there.
     fn is_negative_at(&self, pair: [&Face; 2], at_B: &Vector3<f64>) -> bool {
         let ahead_B = (pair[0].normal_B + pair[1].normal_B).normalize();
         let ahead_B = at_B + ahead_B * (AHEAD * self.extent_m);
@@ -76,7 +76,7 @@ impl Mesh {
     }
 }
 
-/// Where a plane cuts a triangle, of which these are the corners' heights above it.
+/// Ends of the line in which a plane cuts a triangle, of which these are the corners' heights above it.
 fn cut_by_plane(corners: &[Vector3<f64>; 3], heights: [f64; 3]) -> Option<[Vector3<f64>; 2]> {
     let (mut ends, mut count) = ([Vector3::zeros(); 2], 0);
     for corner in 0..3 {

@@ -25,7 +25,7 @@ struct Edge {
     inward: Vector3<f64>,
 }
 
-/// How much of a rim other faces lie along.
+/// Extent of a rim along which other faces lie.
 enum Along {
     All,
     Some,

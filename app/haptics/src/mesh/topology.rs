@@ -36,7 +36,7 @@ pub(super) fn link(
     Ok(links)
 }
 
-/// Whether three and more faces, one of them of a sheet at least, share an edge. Whichever two of them are joined, a walk over
+/// True if three and more faces, one of them of a sheet at least, share an edge. Whichever two of them are joined, a walk over
 /// that edge passes below the others on one of its sides.
 pub(super) fn do_sheets_meet(triangles: &[Triangle], vertices: usize, parts: &Parts) -> bool {
     let (mut sides, starts) = sides_by_lower_vertex(triangles, vertices);

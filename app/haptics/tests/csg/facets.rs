@@ -203,7 +203,7 @@ fn a_box_with_many_long_bores_is_as_large_as_the_box() {
     assert!((0.9..1.01).contains(&(missing / bored)), "{missing}");
 }
 
-/// What is made of planes alone is as large as its corners are far.
+/// A solid of planes alone is as large as its corners are far.
 #[test]
 fn a_solid_of_planes_alone_is_drawn_to_its_corners() {
     let wall = |normal: [f64; 3], offset_m: f64| {

@@ -46,7 +46,7 @@ fn steps(from: Vector3<f64>, to: Vector3<f64>) -> impl Iterator<Item = Vector3<f
     (1..=ticks).map(move |tick| from + (to - from) * (f64::from(tick) / f64::from(ticks)))
 }
 
-/// Whether a finger is held at the end, far away; and how deep inside it was at most without being felt.
+/// A finger is held at the end, far away; and the largest depth inside at which it was not felt.
 fn felt(mesh: &Mesh, entity: &Entity, radius_m: f64, hips: &[Vector3<f64>]) -> (bool, f64) {
     let (mut finger, mut is_held, mut unfelt_m) = (finger(radius_m), false, 0.0_f64);
     for hip in hips {
@@ -59,7 +59,7 @@ fn felt(mesh: &Mesh, entity: &Entity, radius_m: f64, hips: &[Vector3<f64>]) -> (
     (is_held, unfelt_m)
 }
 
-/// What holds a point at the end of a stroke holds a ball, too, that fits into the same folds.
+/// A fold that holds a point at the end of a stroke holds a ball, too, that fits into it.
 fn stroke_over(name: &str, soup: TriangleSoup, strokes: usize, noise: &mut Noise) {
     let mesh = Arc::new(Mesh::build(soup).unwrap().0);
     let entity = touchable(&mesh, Friction::None);

@@ -3,8 +3,8 @@
 
 use crate::common::meshes::*;
 use crate::common::*;
-use haptics::Friction;
 use haptics::mesh::{CloseHoles, Mesh, MeshReport, TriangleSoup};
+use haptics::{Entity, Finger, Friction};
 use nalgebra::{Isometry3, Vector3};
 use std::sync::Arc;
 
@@ -18,6 +18,21 @@ fn soup(quads: &[Quad]) -> TriangleSoup {
         soup.faces.extend([[first, first + 1, first + 2], [first, first + 2, first + 3]]);
     }
     soup
+}
+
+/// HIP and god-object, or the HIP again where nothing is touched, of a finger that goes half a millimetre in a tick.
+fn stroke<'f>(
+    finger: &'f mut Finger,
+    entity: &'f Entity,
+    from: Vector3<f64>,
+    to: Vector3<f64>,
+) -> impl Iterator<Item = [Vector3<f64>; 2]> + 'f {
+    let ticks = ((to - from).norm() / 5e-4).ceil() as u32 + 1;
+    (1..=ticks).map(move |tick| {
+        let hip = from + (to - from) * (f64::from(tick) / f64::from(ticks));
+        let output = step(finger, entity, &hip);
+        [hip, if output.entity.is_some() { output.god_object_W } else { hip }]
+    })
 }
 
 fn report(quads: &[Quad]) -> MeshReport {
@@ -230,15 +245,10 @@ impl Rooms {
                 }
             }
             let aim = self.place(aim);
-            let ticks = ((aim - hip).norm() / 5e-4).ceil() as u32 + 1;
-            let begin = hip;
-            for tick in 1..=ticks {
-                hip = begin + (aim - begin) * (f64::from(tick) / f64::from(ticks));
-                let output = step(&mut finger, &entity, &hip);
-                let god = if output.entity.is_some() { output.god_object_W } else { hip };
+            for [at, god] in stroke(&mut finger, &entity, std::mem::replace(&mut hip, aim), aim) {
                 let strays = |room: [i32; 3]| room != home && (is_in(home) || is_in(room));
                 if let Some(room) = self.room(&god).filter(|room| strays(*room)) {
-                    return Some(format!("{home:?} -> {room:?}, {god:?} of {hip:?}"));
+                    return Some(format!("{home:?} -> {room:?}, {god:?} of {at:?}"));
                 }
             }
         }
@@ -288,12 +298,7 @@ fn out_of_hollow_rooms_that_touch_along_an_edge_no_finger_gets() {
         step(&mut finger, &entity, &hip);
         for _ in 0..10 {
             let aim = at([0.1, 0.1, 0.05].map(|at| at + noise.between(-0.02, 0.02)));
-            let ticks = ((aim - hip).norm() / 5e-4).ceil() as u32 + 1;
-            let begin = hip;
-            for tick in 1..=ticks {
-                hip = begin + (aim - begin) * (f64::from(tick) / f64::from(ticks));
-                let output = step(&mut finger, &entity, &hip);
-                let god = if output.entity.is_some() { output.god_object_W } else { hip };
+            for [_, god] in stroke(&mut finger, &entity, std::mem::replace(&mut hip, aim), aim) {
                 let in_room = pose.inverse_transform_point(&nalgebra::Point3::from(god));
                 assert!(in_room.iter().all(|x| (-1e-9..0.1 + 1e-9).contains(x)), "{round}: {in_room}");
             }
@@ -340,15 +345,10 @@ fn below_a_wall_that_is_short_by_a_rounding_no_finger_gets() {
                 noise.between(-0.02, 0.004),
                 noise.between(-0.03, 0.03),
             ]);
-            let ticks = ((aim - hip).norm() / 5e-4).ceil() as u32 + 1;
-            let begin = hip;
-            for tick in 1..=ticks {
-                hip = begin + (aim - begin) * (f64::from(tick) / f64::from(ticks));
-                let output = step(&mut finger, &entity, &hip);
-                let god = if output.entity.is_some() { output.god_object_W } else { hip };
+            for [at, god] in stroke(&mut finger, &entity, std::mem::replace(&mut hip, aim), aim) {
                 let place = pose.inverse_transform_point(&nalgebra::Point3::from(god));
                 let is_beside = side * (place.x - 0.05) > -1e-6 && place.y > -1e-6;
-                assert!(is_beside, "{round}, {gap_m}: {place} of {hip}");
+                assert!(is_beside, "{round}, {gap_m}: {place} of {at}");
             }
         }
     }
