@@ -382,6 +382,9 @@ impl FastStep {
             }
             command.devices[finger.device].force_on_user_n = finger.mount.force_to_device(row.force_on_user);
         }
+        for (finger, entity, most_n) in self.objects.shortened() {
+            self.fingers[finger].finger.shorten(entity, most_n);
+        }
         for (finger, entity) in self.objects.given_up() {
             self.fingers[finger].finger.forget(entity);
         }

@@ -3,7 +3,7 @@
 //! Problem: what a heap costs hangs on its shapes, on how it lies and on the machine. A finger in one that takes longer than a
 //! tick gets no answers.
 //! Model: where two ticks in a row took more than a third of the time between two, fewer are stepped
-//! ([`physics::Manipulation::step_at_most`]), as many as would have kept to it, or half as many; where of many nearly all took less
+//! ([`physics::Manipulation::step_at_most`]), as many as would have kept to it by the shorter one of them, or an eighth; where of many nearly all took less
 //! than half of that while some waited, more are. One that was held up by something else changes nothing.
 
 /// The number, and what has been seen.
@@ -11,7 +11,8 @@
 pub struct Pace {
     most_ns: u64,
     bodies: usize,
-    was_over: bool,
+    /// Time that the last tick took, if that was too much (ns); twice in a row is counted anew.
+    was_over_ns: Option<u64>,
     /// Ticks of this window, and those of them that were not calm.
     ticks: [u32; 2],
 }
@@ -24,7 +25,7 @@ impl Pace {
 
     /// For ticks that are so far apart (ns).
     pub fn new(period_ns: u64) -> Self {
-        Self { most_ns: Self::most_ns(period_ns), bodies: FIRST, was_over: false, ticks: [0; 2] }
+        Self { most_ns: Self::most_ns(period_ns), bodies: FIRST, was_over_ns: None, ticks: [0; 2] }
     }
 
     /// The most bodies in a tick.
@@ -35,10 +36,12 @@ impl Pace {
     /// After a tick that took so long (ns) with so many bodies, while others waited or did not.
     pub fn take(&mut self, took_ns: u64, stepped: usize, others_wait: bool) {
         let is_over = took_ns > self.most_ns;
-        if is_over && self.was_over {
-            // Half as many at least: what took so long was found in a tick that somebody else may have held up, too.
-            let fitting = (stepped as u64).saturating_mul(self.most_ns) / took_ns;
-            self.bodies = (fitting as usize).clamp(stepped.min(self.bodies) / 2, self.bodies).max(LEAST);
+        let was_over_ns = self.was_over_ns.take().filter(|_| is_over);
+        if let Some(was_ns) = was_over_ns {
+            // One of the two somebody else may have held up, and the other one perhaps, too.
+            let fitting = (stepped as u64).saturating_mul(self.most_ns) / took_ns.min(was_ns);
+            self.bodies =
+                (fitting as usize).clamp(stepped.min(self.bodies) / MOST_LESS, self.bodies).max(LEAST);
         }
         let is_calm = took_ns < self.most_ns / 2 && others_wait;
         self.ticks = [self.ticks[0] + 1, self.ticks[1] + u32::from(!is_calm)];
@@ -48,8 +51,9 @@ impl Pace {
             }
             self.ticks = [0; 2];
         }
-        // Twice in a row is counted anew.
-        self.was_over = is_over && !self.was_over;
+        if is_over && was_over_ns.is_none() {
+            self.was_over_ns = Some(took_ns);
+        }
     }
 }
 
@@ -58,6 +62,8 @@ const SHARE: u64 = 3;
 /// Bodies before anything was seen.
 const FIRST: usize = 64;
 const LEAST: usize = 4;
+/// Two ticks leave one in so many at least.
+const MOST_LESS: usize = 8;
 /// Ticks of which seven in eight have to be calm.
 const WINDOW: u32 = 32;
 

@@ -346,7 +346,7 @@ fn model_files(scene: &Scene) -> impl Iterator<Item = &PathBuf> {
 
 /// Those that are felt, and those that are only seen.
 fn all_model_files(scene: &Scene) -> impl Iterator<Item = &PathBuf> {
-    let visuals = scene.entities.iter().flat_map(|entity| &entity.visuals);
+    let visuals = scene.entities.iter().flat_map(|entity| &*entity.visuals);
     let seen = visuals.filter_map(|visual| match &visual.shape {
         Some(ShapeSpec::Mesh(model) | ShapeSpec::Nurbs(model)) => Some(&model.file),
         _ => None,

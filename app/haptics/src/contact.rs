@@ -225,6 +225,13 @@ impl Slot {
         }
     }
 
+    /// The contact goes on with no more than this force (N), and what finger and entity move.
+    pub(crate) fn shorten(&mut self, most_n: f64) {
+        if let Some(contact) = &self.contact {
+            self.onset.shorten(most_n / contact.stiffness_n_per_m);
+        }
+    }
+
     /// Where the finger touches the entity, in this tick.
     pub(crate) fn touch_points(&self, entity: &Entity, finger_radius_m: f64) -> TouchPoints {
         let Some(contact) = &self.contact else { return TouchPoints::NONE };

@@ -75,7 +75,7 @@ pub struct Entity {
     /// How it hums while it is touched.
     pub vibration: Option<Vibration>,
     /// In triangles, for balls to which the shape itself has nothing to offer; see [`Self::prepared_for`].
-    pub for_balls: Option<Shape>,
+    pub for_balls: Option<Shared<Shape>>,
     /// Whether fingers feel it.
     pub is_haptic: bool,
     /// Whether other entities collide with it.
@@ -202,7 +202,7 @@ impl Entity {
     pub fn prepared_for(mut self, finger_radius_m: f64) -> Self {
         if let (Shape::Form(form), false) = (&self.shape, self.shape.is_felt_by(finger_radius_m)) {
             let mesh = tessellated(form).and_then(|soup| Mesh::build(soup).ok());
-            self.for_balls = mesh.map(|(mesh, _)| Shape::from(Arc::new(mesh)));
+            self.for_balls = mesh.map(|(mesh, _)| Arc::new(Shape::from(Arc::new(mesh))).into());
         }
         self
     }

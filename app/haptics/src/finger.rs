@@ -251,6 +251,14 @@ impl Finger {
         self.slots.vacate(entity);
     }
 
+    /// The contact with one entity goes on with no more than this force (N, >= 0), and grows with what finger and entity move, until
+    /// the god-object is as near as that: what it was behind by is forgotten.
+    pub fn shorten(&mut self, entity: usize, most_n: f64) {
+        if let Some(slot) = self.slots.of_mut(entity) {
+            slot.shorten(most_n.max(0.0));
+        }
+    }
+
     /// Ends all contacts and forgets where the finger was: the next step is a first one, in the same space.
     pub fn reset(&mut self) {
         self.previous_hip_W = None;

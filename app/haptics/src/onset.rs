@@ -74,6 +74,14 @@ impl Onset {
         *self = Self { lag_m: self.lag_m, spring_m: self.spring_m, ..Self::AT_ONCE };
     }
 
+    /// The spring is no longer than this from the next tick on (m), and then grows with what moves, as that of a contact that begins
+    /// inside.
+    pub(crate) fn shorten(&mut self, spring_m: f64) {
+        if spring_m < self.spring_m {
+            (self.longest, self.spring_m) = (Longest::Bound(spring_m), spring_m);
+        }
+    }
+
     /// What the last tick's force was multiplied by, 0 to 1.
     pub(crate) fn share(&self) -> f64 {
         self.share

@@ -125,6 +125,11 @@ impl Slots {
         self.place(entity).map(|slot| &self.slots[slot])
     }
 
+    /// The same, to be changed.
+    pub(crate) fn of_mut(&mut self, entity: usize) -> Option<&mut Slot> {
+        self.place(entity).map(|slot| &mut self.slots[slot])
+    }
+
     /// Forgets all about an entity.
     pub(crate) fn vacate(&mut self, entity: usize) {
         if let Some(slot) = self.place(entity) {

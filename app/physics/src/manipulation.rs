@@ -32,12 +32,13 @@ use nalgebra::Vector3;
 
 use crate::anchor::Anchor;
 use crate::body::Body;
-use crate::broad_phase::BroadPhase;
+use crate::broad_phase::{Aabb, BroadPhase};
 use crate::collide::{self, MAX_POINTS, can_move};
 use crate::contacts::Contacts;
 use crate::error::BodyError;
 use crate::hand::{FingerSettings, FingerTick, Hand};
 use crate::integrator::Gets;
+use crate::pair::REACH_M;
 use crate::pairs::{self, Key, Pairs, Who};
 use crate::pull::{MAX_PULLS, Pull};
 use crate::roster::Roster;
@@ -206,6 +207,7 @@ impl Manipulation {
             of_pairs: (at_first.next_multiple_of(pairs::CHUNK) * MAX_POINTS).min(ROWS.max(rows_of_bodies)),
             of_fingers: MAX_TOUCHES + MAX_PULLS,
             bodies: count,
+            integrator: settings.integrator,
         };
         let heaviest_kg = bodies.iter().map(|(_, body)| body.mass.mass_kg).fold(0.0, f64::max);
         let mut made = Self {
@@ -365,9 +367,17 @@ impl Manipulation {
 
 /// Contact points that two are likely to have when they touch.
 fn likely_points(key: &Key, entities: &[Entity], roster: &Roster) -> usize {
-    let both = [roster.entities[key.body as usize], key.entity as usize];
-    let is_round = |entity: usize| matches!(entities[entity].shape, Shape::Form(Form::Sphere(_)));
-    if both.into_iter().any(is_round) { 1 } else { 4 }
+    let both = [roster.entities[key.body as usize], key.entity as usize].map(|entity| &entities[entity]);
+    let are_apart = match both.map(Aabb::of_entity) {
+        [Some(one), Some(other)] => !one.grown(REACH_M).overlaps(&other),
+        _ => false,
+    };
+    let is_round = |entity: &Entity| matches!(entity.shape, Shape::Form(Form::Sphere(_)));
+    match both {
+        _ if are_apart => 0,
+        both if both.into_iter().any(is_round) => 1,
+        _ => 4,
+    }
 }
 
 fn check(entities: &[Entity], bodies: &[(usize, Body)]) -> Result<(), BodyError> {

@@ -49,6 +49,8 @@ pub(crate) struct Pair {
     count: usize,
     /// Nobody has looked yet whether it touches.
     is_new: bool,
+    /// One of them was driven while the other one waited for its turn.
+    was_pushed: bool,
     ledger: Ledger,
     /// Where its rows of this tick begin.
     first_row: usize,
@@ -100,10 +102,10 @@ impl Pair {
         Self::of(vec![Anchor::default(); MAX_POINTS], PairMemory::default())
     }
 
-    /// Room for what most pairs have; more is allocated when it is needed.
+    /// No room for points yet, which most pairs of boxes that only come near never have; it is allocated when it is needed.
     pub(crate) fn with_little_room() -> Self {
         let memory = PairMemory { patches: Places::later(), ..PairMemory::default() };
-        Self::of(vec![Anchor::default(); FEW_POINTS], memory)
+        Self::of(Vec::new(), memory)
     }
 
     fn of(anchors: Vec<Anchor>, memory: PairMemory) -> Self {
@@ -117,6 +119,7 @@ impl Pair {
             anchors: anchors.into(),
             count: 0,
             is_new: false,
+            was_pushed: false,
             ledger: Ledger::default(),
             first_row: 0,
             rows: 0,
@@ -126,8 +129,8 @@ impl Pair {
     /// Room for so many points, of who has [little](Self::with_little_room).
     fn make_room(&mut self, points: usize) {
         if points > self.anchors.len() {
-            let mut more =
-                vec![Anchor::default(); if points > SOME_POINTS { MAX_POINTS } else { SOME_POINTS }];
+            let room = [FEW_POINTS, SOME_POINTS].into_iter().find(|&room| points <= room);
+            let mut more = vec![Anchor::default(); room.unwrap_or(MAX_POINTS)];
             more[..self.anchors.len()].copy_from_slice(&self.anchors);
             self.anchors = more.into();
         }
@@ -144,7 +147,7 @@ impl Pair {
     ) {
         self.forget(has_mesh);
         (self.entities, self.surfacing, self.has_mesh) = (entities, surfacing, has_mesh);
-        (self.bodies, self.is_new) = ((0, None), was_put);
+        (self.bodies, self.is_new, self.was_pushed) = ((0, None), was_put, false);
     }
 
     fn forget(&mut self, has_mesh: bool) {
@@ -274,6 +277,9 @@ impl Pair {
         if begins && self.ledger.is_closed() && self.is_new {
             self.ledger = Ledger::of(full_j, is_let_out);
         }
+        if std::mem::take(&mut self.was_pushed) {
+            self.ledger.refund(full_j);
+        }
         self.ledger.cut(full_j, is_let_out);
         let springs = &springs[..SPRINGS_OF_POINT * points.len().min(MAX_POINTS)];
         let allowed = self.ledger.allow(springs, k, is_let_out);
@@ -322,6 +328,11 @@ impl Pair {
     pub(crate) fn was_put(&mut self) {
         self.pass_by();
         self.is_new = true;
+    }
+
+    /// What is driven came nearer while the other one waited for its turn: that was worked for by who drives it.
+    pub(crate) fn was_pushed(&mut self) {
+        self.was_pushed = true;
     }
 
     /// True if it had rows in the last tick.

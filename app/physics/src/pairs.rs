@@ -17,8 +17,9 @@ pub(crate) use pool::CHUNK;
 use pool::{Chunk, Pool};
 
 use crate::broad_phase::BroadPhase;
+use crate::collide::bounding_ball;
 use crate::contacts::Contacts;
-use crate::pair::{Head, Pair, Surfacing};
+use crate::pair::{self, Head, Pair, REACH_M, Surfacing};
 
 /// Pairs, and which bodies and entities they are of.
 #[derive(Debug, Clone)]
@@ -69,7 +70,7 @@ pub(crate) struct Key {
     /// An entity, which may be a body of a higher number.
     pub(crate) entity: u32,
     place: u32,
-    /// Whether they were near enough to touch in the last tick, or nobody has looked yet.
+    /// Whether they were near enough to touch in the last tick, or when the pair began if that was later.
     pub(crate) is_near: bool,
 }
 
@@ -318,7 +319,9 @@ impl Pairs {
         let surfacing = Surfacing::between(both[0], both[1], &who.contacts);
         let has_mesh = both.iter().any(|entity| matches!(entity.shape, Shape::Mesh(_)));
         self.pool[place].begin(entities, has_mesh, surfacing, was_put);
-        Some((place_in_order, Key::new([first as u32, second as u32], true, place)))
+        let way_m: f64 = both.map(way_m).iter().sum();
+        let is_near = pair::is_near(both[0], both[1], REACH_M + way_m);
+        Some((place_in_order, Key::new([first as u32, second as u32], is_near, place)))
     }
 
     /// Takes up the pairs of a body that was woken, and begins those that are missing.
@@ -383,6 +386,22 @@ impl Pairs {
         }
     }
 
+    /// These entities were driven while these bodies waited for their turn.
+    pub(crate) fn were_driven_among(&mut self, moved: &[u32], concerns: impl Fn(u32) -> bool, who: &Who<'_>) {
+        if moved.is_empty() {
+            return;
+        }
+        for key in &self.awake {
+            let [own, other] = [who.entities[key.body as usize] as u32, key.entity];
+            let body_of = |entity: u32| who.bodies[entity as usize];
+            let is_met =
+                |moved_one: u32, met: u32| moved.contains(&moved_one) && body_of(met).is_some_and(&concerns);
+            if is_met(own, other) || is_met(other, own) {
+                self.pool[key.place].was_pushed();
+            }
+        }
+    }
+
     /// An entity was put somewhere else by somebody.
     pub(crate) fn was_put(&mut self, entity: usize) {
         for key in self.awake.iter().chain(&self.asleep) {
@@ -398,25 +417,33 @@ impl Pairs {
         &mut self.pool[place]
     }
 
-    /// Puts pairs into the lists that were [begun](Self::begin_as) apart; one that is there already becomes what comes.
-    pub(crate) fn let_in(&mut self, coming: &[Key], is_awake: impl Fn(usize) -> bool, who: &Who<'_>) {
-        for key in coming {
-            let other = who.bodies[key.entity as usize];
-            let is_awake = is_awake(key.body as usize) || other.is_some_and(|other| is_awake(other as usize));
-            let at = |keys: &[Key]| {
-                keys.binary_search_by_key(&(key.body, key.entity), |key| (key.body, key.entity))
-            };
-            for keys in [&mut self.awake, &mut self.asleep] {
-                if let Ok(known) = at(keys) {
-                    self.unused.push(keys.remove(known).place);
+    /// Puts pairs into the lists that were [begun](Self::begin_as) apart, which are sorted by it; one that is there already becomes
+    /// what comes.
+    pub(crate) fn let_in(&mut self, coming: &mut [Key], is_awake: impl Fn(usize) -> bool, who: &Who<'_>) {
+        coming.sort_unstable();
+        let of = |key: &Key| (key.body, key.entity);
+        let Self { pool, unused, awake, asleep, fresh, .. } = self;
+        for keys in [&mut *awake, &mut *asleep] {
+            keys.retain(|key| {
+                let is_known = coming.binary_search_by_key(&of(key), of).is_ok();
+                if is_known {
+                    unused.push(key.place);
+                }
+                !is_known
+            });
+        }
+        for is_of_awake in [true, false] {
+            for key in &*coming {
+                let other = who.bodies[key.entity as usize];
+                let has_awake =
+                    is_awake(key.body as usize) || other.is_some_and(|other| is_awake(other as usize));
+                if has_awake == is_of_awake {
+                    // Whoever sent it may not know yet what is known here.
+                    pool[key.place].resurface(who);
+                    fresh.push(*key);
                 }
             }
-            // Whoever sent it may not know yet what is known here.
-            self.pool[key.place].resurface(who);
-            let keys = if is_awake { &mut self.awake } else { &mut self.asleep };
-            if let Err(at) = at(keys) {
-                keys.insert(at, *key);
-            }
+            merge(if is_of_awake { &mut *awake } else { &mut *asleep }, fresh);
         }
     }
 
@@ -478,6 +505,13 @@ impl Pairs {
 }
 
 /// Moves those keys out that go.
+/// How far a point of an entity went in the last tick, at most \[m\].
+fn way_m(entity: &Entity) -> f64 {
+    let (was, is) = (&entity.previous_X_WB, &entity.X_WB);
+    let arm_m = bounding_ball(&entity.shape).map_or(0.0, |(middle, radius_m)| middle.norm() + radius_m);
+    (is.translation.vector - was.translation.vector).norm() + arm_m * is.rotation.angle_to(&was.rotation)
+}
+
 fn move_out(keys: &mut Vec<Key>, to: &mut Vec<Key>, goes: impl Fn(&Key) -> bool) {
     keys.retain(|key| {
         let goes = goes(key);

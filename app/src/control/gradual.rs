@@ -7,7 +7,7 @@
 //! - Forces come and go with a world within [`FADE_S`]: in each tick by the tick's part of it.
 
 use super::order::{Move, Scale};
-use super::path::{Next, Path};
+use super::path::{MOST_PACE_PER_S, Next, Path};
 use crate::fast_step::FastStep;
 pub use crate::fast_step::{FADE_S, MOST_SHARE};
 use physics::MAX_DRIVEN;
@@ -23,6 +23,8 @@ pub struct Gradual {
     targets: Box<[[f64; 2]]>,
     is_scaling: bool,
     paths: Vec<Path>,
+    /// How fast all of them go, as a share of how fast they would.
+    pace: f64,
     /// Whether somebody can only go on while no force is felt.
     needs_silence: bool,
     /// Orders that could not be done.
@@ -37,6 +39,7 @@ impl Gradual {
             targets: vec![[1.0; 2]; entities].into(),
             is_scaling: false,
             paths,
+            pace: 1.0,
             needs_silence: false,
             undone: 0,
         }
@@ -98,13 +101,23 @@ impl Gradual {
                 self.is_scaling |= nearer != *target;
             }
         }
-        let Self { paths, needs_silence, undone, .. } = self;
+        let Self { paths, pace, needs_silence, undone, .. } = self;
         *needs_silence = false;
+        // All at one pace: what belongs together stays together.
+        let mut looked = (true, 1.0);
+        for path in paths.iter_mut() {
+            let (is_clear, share) = path.look(step, dt_s);
+            looked = (looked.0 && is_clear, share.min(looked.1));
+        }
+        let (is_clear, share) = looked;
+        let wanted: f64 = if is_clear { 1.0 } else { 0.0 };
+        *pace = wanted.clamp(*pace - MOST_PACE_PER_S * dt_s, *pace + MOST_PACE_PER_S * dt_s);
+        let most_s = pace.min(share) * dt_s;
         paths.retain_mut(|path| {
-            let next = path.advance(step, dt_s, is_silent);
+            let next = path.advance(step, most_s, is_clear, is_silent);
             *needs_silence |= next == Next::NeedsSilence;
-            *undone += u64::from(next == Next::Undone);
-            matches!(next, Next::GoesOn | Next::NeedsSilence)
+            *undone += u64::from(matches!(next, Next::Undone | Next::Stopped));
+            !matches!(next, Next::Done | Next::Undone)
         });
     }
 }

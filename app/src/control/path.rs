@@ -3,7 +3,8 @@
 //! Model: a path of least jerk from where it is to where it is to be, no faster than [`MOST_SPEED_M_S`] and sped up by no more
 //! than [`MOST_ACCELERATION_M_S2`], for each of its points: where that takes longer than was asked for, it takes longer. A
 //! finger that stands in its way feels k times the way of a tick more in each tick, at most. It waits, and stops on its way,
-//! until what it comes near is in the fast list.
+//! until what it comes near is in the fast list and, where that cannot step all in a tick, has had its turn. All that is moved
+//! at a time waits together: parts of a tray do not leave each other behind.
 
 use super::order::{Move, Turn};
 use crate::fast_step::{FastStep, Hold};
@@ -14,6 +15,9 @@ use physics::collide::bounding_ball;
 pub const MOST_SPEED_M_S: f64 = 0.5;
 /// How much its speed changes at most \[m/s^2\].
 pub const MOST_ACCELERATION_M_S2: f64 = 5.0;
+/// How much the share of its speed with which it goes changes at most per time, where something has to come first \[1/s\]: from its
+/// largest speed that is the largest acceleration, and it stands within the way for which it looks ahead.
+pub(super) const MOST_PACE_PER_S: f64 = MOST_ACCELERATION_M_S2 / MOST_SPEED_M_S;
 /// Of what has no end, points so far from its frame's origin count \[m\].
 const ENDLESS_M: f64 = 1.0;
 
@@ -23,6 +27,8 @@ pub(super) struct Path {
     pub(super) entity: usize,
     wanted: Move,
     stage: Stage,
+    /// What was [found](Self::look) in this tick.
+    hold: Hold,
     /// Of a body: it had been parked, and is put where it is to be at once. From out of the world the way is long.
     was_parked: bool,
     /// Where it goes then: the newest order that came meanwhile.
@@ -47,6 +53,19 @@ enum Stage {
     Ends,
 }
 
+impl Stage {
+    /// Where the entity is to be a tick (s) later; where it does not go anywhere the origin, for nobody.
+    fn place_after(&self, dt_s: f64) -> Isometry3<f64> {
+        match self {
+            Self::Goes { from_W, to_W, over_s, passed_s } if passed_s + dt_s < *over_s => {
+                between(from_W, to_W, least_jerk((passed_s + dt_s) / over_s))
+            }
+            Self::Goes { to_W, .. } | Self::Rests { to_W } => *to_W,
+            Self::Waits | Self::Ends => Isometry3::identity(),
+        }
+    }
+}
+
 /// What is next.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Next {
@@ -54,38 +73,72 @@ pub(super) enum Next {
     /// There is no going on while fingers feel anything.
     NeedsSilence,
     Done,
-    /// Too much touches it.
+    /// Too much is near it.
     Undone,
+    /// Too much came near it on its way: it stands where it is, and is let go or goes where a newer order has it.
+    Stopped,
 }
 
 impl Path {
     pub(super) fn new(wanted: &Move) -> Self {
-        Self { entity: wanted.entity, wanted: *wanted, stage: Stage::Waits, was_parked: false, then: None }
+        Self {
+            entity: wanted.entity,
+            wanted: *wanted,
+            stage: Stage::Waits,
+            hold: Hold::Coming,
+            was_parked: false,
+            then: None,
+        }
     }
 
-    /// Goes on by a tick.
-    pub(super) fn advance(&mut self, step: &mut FastStep, dt_s: f64, is_silent: bool) -> Next {
+    /// Asks whether what it comes near within this tick (s) is ready for it: whether all of that is here, and for how much of the
+    /// tick it may go on where something waits for its turn, 0 to 1. Whoever goes nowhere has nothing against any.
+    pub(super) fn look(&mut self, step: &mut FastStep, dt_s: f64) -> (bool, f64) {
+        let goes = matches!(self.stage, Stage::Goes { .. });
+        self.hold = match &self.stage {
+            Stage::Waits => step.call(self.entity),
+            Stage::Goes { .. } => step.look_ahead(self.entity, &self.stage.place_after(dt_s)),
+            // It is where it is to be, and comes near nothing.
+            Stage::Rests { .. } | Stage::Ends => Hold::Ready,
+        };
+        let is_clear = match self.hold {
+            Hold::Ready => true,
+            Hold::Coming => false,
+            Hold::TooMuch => !goes,
+        };
+        (is_clear, if goes { step.pace_of_driven(self.entity) } else { 1.0 })
+    }
+
+    /// Goes on by so much time (s), none while something that is here has to have its turn first. None sets out before all of those
+    /// that are moved [are clear](Self::look).
+    pub(super) fn advance(
+        &mut self,
+        step: &mut FastStep,
+        dt_s: f64,
+        is_clear: bool,
+        is_silent: bool,
+    ) -> Next {
         self.was_parked |= matches!(self.stage, Stage::Waits) && step.is_parked(self.entity);
         let becomes_other = step.is_body(self.entity) && step.is_felt_at(self.entity);
+        let place_W = self.stage.place_after(dt_s);
         match &mut self.stage {
-            Stage::Waits => match step.call(self.entity) {
-                Hold::Coming => Next::GoesOn,
-                Hold::TooMuch => Next::Undone,
-                Hold::Ready if becomes_other && !is_silent => Next::NeedsSilence,
-                Hold::Ready => {
-                    step.take_hold(self.entity);
-                    self.set_out(step);
-                    Next::GoesOn
-                }
-            },
-            Stage::Goes { from_W, to_W, over_s, passed_s } => {
-                let now_s = *passed_s + dt_s;
-                let is_there = now_s >= *over_s;
-                let place_W =
-                    if is_there { *to_W } else { between(from_W, to_W, least_jerk(now_s / *over_s)) };
+            Stage::Waits if self.hold == Hold::TooMuch => Next::Undone,
+            Stage::Goes { .. } if self.hold == Hold::TooMuch && dt_s == 0.0 => {
+                self.stage = Stage::Ends;
+                Next::Stopped
+            }
+            Stage::Waits if !is_clear => Next::GoesOn,
+            Stage::Goes { .. } if dt_s == 0.0 => Next::GoesOn,
+            Stage::Waits if becomes_other && !is_silent => Next::NeedsSilence,
+            Stage::Waits => {
+                step.take_hold(self.entity);
+                self.set_out(step);
+                Next::GoesOn
+            }
+            Stage::Goes { over_s, passed_s, .. } => {
                 if step.drive(self.entity, place_W) {
-                    *passed_s = now_s;
-                    if is_there {
+                    *passed_s += dt_s;
+                    if *passed_s >= *over_s {
                         self.stage = Stage::Rests { to_W: place_W };
                     }
                 }

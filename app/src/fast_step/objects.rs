@@ -76,8 +76,15 @@ pub struct Objects {
     pub(super) is_paused: bool,
     /// What was moved, as the slow list has to know it.
     pub(super) moved: Moved,
+    /// Of each touch, the force of all that its god-object is behind the finger (N).
+    behind_n: Vec<f64>,
     /// Contacts with what has not been handed over that are given up: fingers and entities.
     given_up: Vec<(usize, usize)>,
+    /// Those that go on with a shorter spring, of this force (N).
+    shortened: Vec<(usize, usize, f64)>,
+    /// Contacts with bodies and their forces (N) when time stopped, as long as it stands still.
+    stood: Vec<(usize, usize, f64)>,
+    has_stood: bool,
     /// Of each finger, for how many ticks it is still taken for one that presses bodies into others that wait.
     leaning: Vec<u32>,
     /// Force with which each of those pushes things away (N); zero for others.
@@ -134,7 +141,11 @@ impl Objects {
             stands_still: false,
             is_paused: false,
             moved: Moved::default(),
+            behind_n: Vec::with_capacity(room),
             given_up: Vec::with_capacity(room.min(MOST_GIVEN_UP)),
+            shortened: Vec::with_capacity(room),
+            stood: Vec::with_capacity(room),
+            has_stood: false,
             leaning: vec![0; fingers.len()],
             pushes_n: vec![0.0; fingers.len()],
             gives_way: vec![false; fingers.len()],
@@ -280,6 +291,13 @@ impl Objects {
         self.changed.extend_from_slice(self.manipulation.changed());
         self.manipulation.forget_changes();
         self.note_changed();
+        for entity in self.manipulation.driven() {
+            let (Some(body), is) = (self.manipulation.body_of(entity), &entities[entity]) else { continue };
+            let turn_W = is.X_WB.rotation * is.previous_X_WB.rotation.inverse();
+            let row = &mut self.rows[body];
+            row.velocity = (is.X_WB.translation.vector - is.previous_X_WB.translation.vector) / self.period_s;
+            row.angular_velocity = turn_W.scaled_axis() / self.period_s;
+        }
     }
 
     /// The world begins in this tick of the run.
@@ -335,16 +353,22 @@ impl Objects {
         dt_s: f64,
     ) {
         if self.is_paused || self.stands_still {
+            self.bound_while_standing(fingers);
             return self.stand(entities);
         }
+        self.has_stood = false;
         self.pull(felt, rows);
         self.touches.clear();
+        self.behind_n.clear();
         for (index, finger) in fingers.iter().enumerate() {
             for contact in finger.finger.contacts() {
                 if self.manipulation.is_body(contact.entity) {
+                    let behind_m =
+                        finger.finger.last_hip_W().map_or(0.0, |hip_W| (contact.god_object_W - hip_W).norm());
                     for point in finger.finger.touch_points(entities, contact.entity).as_slice() {
                         if self.touches.len() < self.touches.capacity() {
                             self.touches.push(Touch::at(point, contact, index));
+                            self.behind_n.push(behind_m * contact.stiffness_n_per_m);
                         }
                     }
                 }
@@ -415,15 +439,17 @@ impl Objects {
     fn give_way_to(&mut self, finger: usize) -> bool {
         let mut gave_way = false;
         let pushes_n = self.pushes_n[finger];
+        let coming =
+            self.touches.iter().filter(|touch| touch.finger == finger && self.is_on_its_way(touch.entity));
+        let coming_n: f64 = coming.map(|touch| touch.force_on_user_W.norm()).sum();
         for at in 0..self.touches.len() {
             let touch = self.touches[at];
             if touch.finger != finger {
                 continue;
             }
-            let touch_n = touch.force_on_user_W.norm();
             let is_on_its_way = self.is_on_its_way(touch.entity);
             let (pressed_n, most_n) =
-                if is_on_its_way { (touch_n, MOST_UNTIL_IT_COMES_N) } else { (pushes_n, MOST_LEANING_N) };
+                if is_on_its_way { (coming_n, MOST_UNTIL_IT_COMES_N) } else { (pushes_n, MOST_LEANING_N) };
             let felt_n = pressed_n.min(most_n);
             if felt_n >= pressed_n {
                 continue;
@@ -439,11 +465,59 @@ impl Objects {
             }
             self.touches[at].force_on_user_W = force_on_user_W;
             // What comes later must not find a spring of any length.
-            if pressed_n > GIVEN_UP_N && self.given_up.len() < self.given_up.capacity() {
+            let behind_n = if is_on_its_way { self.behind_n[at] } else { pressed_n };
+            if behind_n > GIVEN_UP_N && self.given_up.len() < self.given_up.capacity() {
                 self.given_up.push((touch.finger, touch.entity));
+            }
+            let was_shortened =
+                self.shortened.iter().any(|(own, entity, _)| (*own, *entity) == (finger, touch.entity));
+            if is_on_its_way && !was_shortened && self.shortened.len() < self.shortened.capacity() {
+                let own = self.touches[at..]
+                    .iter()
+                    .filter(|own| (own.finger, own.entity) == (finger, touch.entity));
+                // Those behind this one have all of their force yet.
+                let rest_W: Vector3<f64> =
+                    own.skip(1).map(|own| own.force_on_user_W * (felt_n / pressed_n)).sum();
+                self.shortened.push((finger, touch.entity, (force_on_user_W + rest_W).norm()));
             }
         }
         gave_way
+    }
+
+    /// While time stands still bodies are no walls: what a finger feels of one grows no further than it was, or than what has not
+    /// been handed over may have. In a pause those that are here stand like all that is fixed.
+    fn bound_while_standing(&mut self, fingers: &[DeviceFinger]) {
+        if !std::mem::replace(&mut self.has_stood, true) {
+            self.stood.clear();
+            for touch in &self.touches {
+                let of = (touch.finger, touch.entity);
+                let touch_n = touch.force_on_user_W.norm();
+                match self.stood.iter_mut().find(|(finger, entity, _)| (*finger, *entity) == of) {
+                    Some((.., felt_n)) => *felt_n += touch_n,
+                    None => self.stood.push((of.0, of.1, touch_n)),
+                }
+            }
+        }
+        for (index, finger) in fingers.iter().enumerate() {
+            let coming = finger.finger.contacts().filter(|contact| self.is_on_its_way(contact.entity));
+            let coming_n: f64 = coming.map(|contact| contact.force_on_user_W.norm()).sum();
+            for contact in
+                finger.finger.contacts().filter(|contact| self.manipulation.is_body(contact.entity))
+            {
+                let felt_n = contact.force_on_user_W.norm();
+                let most_n = if self.is_on_its_way(contact.entity) {
+                    felt_n * (MOST_UNTIL_IT_COMES_N / coming_n)
+                } else if self.stands_still {
+                    let of = |stood: &&(usize, usize, f64)| (stood.0, stood.1) == (index, contact.entity);
+                    self.stood.iter().find(of).map_or(0.0, |stood| stood.2).max(MOST_UNTIL_IT_COMES_N)
+                } else {
+                    f64::INFINITY
+                };
+                if felt_n > most_n && self.shortened.len() < self.shortened.capacity() {
+                    self.shortened.push((index, contact.entity, most_n));
+                }
+            }
+        }
     }
 
     /// Force with which a finger pushes things away (N): of what other fingers press against it holds them.
@@ -471,6 +545,11 @@ impl Objects {
             return false;
         };
         self.manipulation.standing(body).is_away() && !lists.hand_over.holds(body)
+    }
+
+    /// The contacts, by finger and entity, that go on with a spring of this force (N).
+    pub(super) fn shortened(&mut self) -> impl Iterator<Item = (usize, usize, f64)> + '_ {
+        self.shortened.drain(..)
     }
 
     /// The contacts, by finger and entity, that end with this tick.

@@ -20,7 +20,7 @@ use world::lists::{FastList, SlowOrder};
 const AROUND_M: f64 = 0.02;
 /// And what could come into its way within this time (s).
 const AHEAD_S: f64 = 0.05;
-/// No more bodies than this, or than the fast list has anyway, are called over for what is moved.
+/// No more bodies than this are called over at once for what is moved.
 pub const MOST_CALLED: usize = 64;
 
 /// The most that stiffness or damping changes in a tick, as a share of itself.
@@ -33,9 +33,9 @@ pub const FADE_S: f64 = 0.1;
 pub enum Hold {
     /// It can be driven.
     Ready,
-    /// It, or something that touches it, has been called over from the slow list.
+    /// It, or something near it, has been called over from the slow list.
     Coming,
-    /// Too much touches it.
+    /// More than can be called over at once is near it.
     TooMuch,
 }
 
@@ -73,12 +73,23 @@ impl FastStep {
         }
     }
 
-    /// In the next tick this entity goes to this pose, if everything that it comes near is here; says whether it goes.
-    pub fn drive(&mut self, entity: usize, to_W: Isometry3<f64>) -> bool {
+    /// Whether this entity could go to this pose in the next tick: everything that it comes near has to be here. What is not is called
+    /// over.
+    pub fn look_ahead(&mut self, entity: usize, to_W: &Isometry3<f64>) -> Hold {
         let Self { objects, entities, period_s, .. } = self;
-        let Some(is) = entities.get(entity) else { return false };
+        let Some(is) = entities.get(entity) else { return Hold::Coming };
         let way_W = (to_W.translation.vector - is.X_WB.translation.vector) * (AHEAD_S / *period_s);
-        objects.is_clear(entity, &way_W) == Hold::Ready && objects.manipulation.drive(entity, to_W)
+        objects.is_clear(entity, &way_W)
+    }
+
+    /// How fast this entity may go, as a share of how fast it would: less than 1 near what waits for its turn.
+    pub fn pace_of_driven(&self, entity: usize) -> f64 {
+        self.objects.manipulation.pace_of_driven(entity)
+    }
+
+    /// In the next tick this entity goes to this pose; says whether it will.
+    pub fn drive(&mut self, entity: usize, to_W: Isometry3<f64>) -> bool {
+        self.objects.manipulation.drive(entity, to_W)
     }
 
     /// Whether a body was parked here.
@@ -227,15 +238,16 @@ impl Objects {
         let Some(lists) = &mut self.lists else { return Hold::Ready };
         let Some(around) = self.manipulation.broad_phase().around(entity) else { return Hold::Ready };
         let soon: Aabb = around.swept(way_W).grown(AROUND_M);
-        let (mut near, mut coming) = (0, false);
+        let (mut away, mut coming) = (0, false);
         self.manipulation.broad_phase().near(&soon, |other| {
-            if let Some(body) = self.manipulation.body_of(other).filter(|_| other != entity) {
-                near += 1;
-                let is_away = self.manipulation.standing(body).is_away();
-                coming |= is_away && !lists.hand_over.holds(body);
+            if let Some(body) = self.manipulation.body_of(other).filter(|_| other != entity)
+                && self.manipulation.standing(body).is_away()
+            {
+                away += 1;
+                coming |= !lists.hand_over.holds(body);
             }
         });
-        if near > MOST_CALLED {
+        if away > MOST_CALLED {
             return Hold::TooMuch;
         }
         lists.hand_over.call_over(soon);

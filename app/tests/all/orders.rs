@@ -490,6 +490,69 @@ fn too_much_on_what_is_to_be_moved_is_told_and_left_where_it_is() {
     assert_eq!(fast.step_mut().entities()[0].X_WB.translation.vector, Vector3::new(0.0, -0.01, 0.0));
 }
 
+/// A plate that goes low over cubes, so that they are near it and it touches none.
+fn over_cubes(count: [u32; 2], spacing_m: [f64; 2]) -> String {
+    let floor =
+        "[[entity]]\nname = \"floor\"\nshape = { kind = \"plane\", normal = [0, 1, 0], offset_m = 0 }\n";
+    let plate = "[[entity]]\nname = \"plate\"\nshape = { kind = \"box\", size_m = [0.4, 0.01, 1.6] }\n\
+                 position_m = [-0.6, 0.02, 0.0]\n";
+    let cubes = format!(
+        "[[entity]]\nname = \"cube\"\nshape = {{ kind = \"box\", size_m = [0.01, 0.01, 0.01] }}\nmass_kg = 0.01\n\
+         position_m = [-0.15, 0.005, -0.7]\n\
+         grid = {{ count = [{}, 1, {}], spacing_m = [{}, 1, {}] }}\n",
+        count[0], count[1], spacing_m[0], spacing_m[1],
+    );
+    format!("{ALL_SLOW}[[finger]]\nstart_m = [0.0, 0.5, 0.0]\n{floor}{plate}{cubes}")
+}
+
+/// Plays orders for so many ticks; where the entities of these numbers are along x after each (m), and how many orders were not done.
+fn ways(scene: &str, script: &str, entities: [usize; 2], ticks: u64) -> (Vec<[f64; 2]>, u64) {
+    let place = Place::new();
+    let rig = place.rig(scene, HandMode::Kinematic);
+    let source = OrderSource::File(place.write("orders.txt", script));
+    let (_desk, orders) = Desk::open(&rig, &source, Means::default()).expect("good orders");
+    let mut driver = VirtualDriver::open(&rig.driver_config(ClockMode::Virtual)).expect("devices");
+    let step = rig.fast_step().expect("a step");
+    let (rows, _taken) = row_queue(step.bodies().len());
+    let mut fast = FastLoop::new(step, rows, WhenFull::Drop, u64::MAX, rig.period_ns).with_control(orders);
+    let mut ways = Vec::new();
+    for tick in 1..=ticks {
+        driver.tick(tick, &mut fast);
+        ways.push(entities.map(|entity| fast.step_mut().entities()[entity].X_WB.translation.x));
+    }
+    (ways, fast.orders().undone)
+}
+
+#[test]
+fn a_plate_goes_over_hundreds_of_things_where_few_come_near_at_a_time() {
+    let (ways, undone) =
+        ways(&over_cubes([12, 14], [0.03, 0.1]), "at 0.1 move plate to 0 0.02 0 in 1", [1; 2], 4000);
+    assert_eq!((ways.last(), undone), (Some(&[0.0; 2]), 0));
+}
+
+#[test]
+fn where_too_much_comes_near_on_its_way_a_plate_stands_that_is_told_and_the_next_order_is_done() {
+    // 70 in a row that it comes to all at once.
+    let script = "at 0.1 move plate to 0 0.02 0 in 1\nat 3 move plate to -0.7 0.02 0 in 1";
+    let (ways, undone) = ways(&over_cubes([1, 70], [1.0, 0.02]), script, [1; 2], 6000);
+    // Its edge is 0.2 m before it, what is soon up to 25 mm farther, what is near 20 mm and two boxes' 5 mm, and cubes are 10 mm.
+    let stood = ways[2900][0];
+    assert!(stood > -0.15 - 0.2 - 0.065 && stood < -0.15 - 0.2, "{stood}");
+    assert_eq!((undone, ways[5999][0]), (1, -0.7));
+}
+
+#[test]
+fn what_is_moved_at_the_same_time_waits_together_and_stays_together() {
+    // Another plate, at which nothing is.
+    let other = "[[entity]]\nname = \"other\"\nshape = { kind = \"box\", size_m = [0.1, 0.01, 0.1] }\nposition_m = [-0.6, 0.3, 0.0]\n";
+    let scene = over_cubes([12, 14], [0.03, 0.1]) + other;
+    let last = 2 + 12 * 14;
+    let script = "at 0.1 move plate to 0 0.02 0 in 1\nat 0.1 move other to 0 0.3 0 in 1";
+    let (ways, undone) = ways(&scene, script, [1, last], 4000);
+    assert!(ways.iter().all(|[plate, other]| plate == other), "they part");
+    assert_eq!((ways.last(), undone), (Some(&[0.0; 2]), 0));
+}
+
 /// A thread of its own makes worlds where time does not wait, but for the first two.
 #[test]
 fn worlds_that_somebody_else_makes_come_in_the_order_of_the_script() {

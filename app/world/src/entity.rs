@@ -47,7 +47,7 @@ pub struct SceneEntity {
     /// Default none.
     pub friction: FrictionSpec,
     /// Faces that are made of something else; of meshes alone.
-    pub faces: Vec<FacesSpec>,
+    pub faces: Arc<[FacesSpec]>,
     /// Share of an approaching velocity that comes back, 0 to 1; default what the other entity, or the scene, says.
     pub restitution: Option<f64>,
     /// Of each point where another entity touches it \[N/m\], if it says.
@@ -76,7 +76,7 @@ pub struct SceneEntity {
     /// Whether other entities collide with it; default yes.
     pub is_collidable: bool,
     /// What is seen of it; default what is felt.
-    pub visuals: Vec<VisualSpec>,
+    pub visuals: Arc<[VisualSpec]>,
     /// The environment behind whose door it is; default in the world outside.
     pub within: Option<String>,
 }
@@ -202,7 +202,7 @@ impl SceneEntity {
             stiffness_n_per_m: stiffness_n_per_m?,
             damping_n_s_per_m: damping_n_s_per_m?,
             friction: friction?,
-            faces: faces?,
+            faces: faces?.into(),
             restitution: restitution?,
             is_stiffness_said: table.get("stiffness_n_per_m").is_some(),
             contact_stiffness_n_per_m: contact_stiffness_n_per_m?,
@@ -217,7 +217,7 @@ impl SceneEntity {
             motion: motion?,
             is_haptic: is_haptic?,
             is_collidable: is_collidable?,
-            visuals: visuals?,
+            visuals: visuals?.into(),
             within: within?,
         })
     }

@@ -106,7 +106,7 @@ impl Scene {
         };
         let mut files = Files::default();
         for entity in &self.entities {
-            for visual in &entity.visuals {
+            for visual in &*entity.visuals {
                 seen.add(entity, visual, &mut files);
             }
         }

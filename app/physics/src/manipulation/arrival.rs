@@ -98,7 +98,10 @@ impl Manipulation {
             }
             arrived(body as usize);
         }
-        bodies.clear();
         keys.clear();
+        // Whoever waits for its turn from now on is in another list, too.
+        while let Some((body, _)) = self.arrival.bodies.pop() {
+            self.note_change(body as usize);
+        }
     }
 }

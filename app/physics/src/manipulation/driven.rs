@@ -11,6 +11,7 @@ use nalgebra::{Isometry3, Matrix3, UnitQuaternion, Vector3};
 use super::Manipulation;
 use super::ordered::at_rest;
 use crate::body::Body;
+use crate::collide::bounding_ball;
 use crate::mass::MassProperties;
 use crate::pair::fastest_point_m_s;
 use crate::roster::Standing;
@@ -53,7 +54,25 @@ impl Manipulation {
         self.advance_driven(entities);
     }
 
-    /// Before a tick: wakes who could be carried or pushed.
+    /// How fast this entity may be driven on now, as a share of how fast it would be, 0 to 1: less than 1 where a body near it waits
+    /// for its turn in [`Self::step_at_most`]. Whoever drives several entities that belong together goes by the least of them.
+    pub fn pace_of_driven(&self, entity: usize) -> f64 {
+        let pace = |body: usize| {
+            let waits = self.standing(body) == Standing::Held;
+            if waits { self.turns.pace_near(body) } else { 1.0 }
+        };
+        let mut least = 1.0_f64;
+        match self.broad_phase.around(entity) {
+            Some(around) => self.broad_phase.near(around, |near| {
+                least = least.min(self.body_of(near).map_or(1.0, pace));
+            }),
+            // Without an end it is near everything.
+            None => least = (0..self.roster.bodies.len()).map(pace).fold(least, f64::min),
+        }
+        least
+    }
+
+    /// Before a tick: wakes who sleeps and could be carried or pushed. Who waits for its turn goes on waiting.
     pub(super) fn wake_near_driven(&mut self, entities: &[Entity]) {
         for at in 0..self.driven.len() {
             let entity = self.driven[at].entity;
@@ -65,7 +84,10 @@ impl Manipulation {
                 None => neighbours.extend(0..self.roster.bodies.len() as u32),
             }
             for at in 0..self.neighbours.len() {
-                self.wake(self.neighbours[at] as usize, entities);
+                let body = self.neighbours[at] as usize;
+                if self.standing(body) != Standing::Held {
+                    self.wake(body, entities);
+                }
             }
         }
     }
@@ -92,10 +114,16 @@ impl Manipulation {
 
     /// Takes them to the end of the tick; who moved in it is driven on to where it is, and so comes to rest.
     pub(super) fn advance_driven(&mut self, entities: &mut [Entity]) {
+        let mut longest_m = 0.0_f64;
         for at in 0..self.driven.len() {
             let Driven { entity, to_W } = self.driven[at];
-            let way_W = to_W.translation.vector - entities[entity].X_WB.translation.vector;
+            let from_W = entities[entity].X_WB;
+            let way_W = to_W.translation.vector - from_W.translation.vector;
+            let arm_m = bounding_ball(&entities[entity].shape)
+                .map_or(1.0, |(middle, radius_m)| middle.norm() + radius_m);
+            longest_m = longest_m.max(way_W.norm() + arm_m * from_W.rotation.angle_to(&to_W.rotation));
             entities[entity].move_to(to_W);
+            self.turns.was_driven(entity);
             if let Some(body) = self.body_of(entity) {
                 self.roster.bodies[body] = at_rest(&self.roster.bodies[body], &to_W);
                 self.note_change(body);
@@ -106,6 +134,7 @@ impl Manipulation {
                 self.greet(&around, entities, false);
             }
         }
+        self.turns.driven_went(longest_m);
         self.driven.retain(|driven| {
             let entity = &entities[driven.entity];
             entity.previous_X_WB != entity.X_WB

@@ -21,7 +21,7 @@ impl Manipulation {
     /// Finds the island of a body: all that could touch, one by one. `island` is filled as far as its capacity goes; says
     /// whether that was far enough.
     ///
-    /// Cost: some walks through the keys of all pairs, at most one more than bodies; a chain takes two.
+    /// Cost: a walk through the keys of all pairs and two through all bodies.
     pub fn island(&mut self, body: usize, island: &mut Vec<usize>) -> bool {
         self.island_if(body, island, |_, _| true)
     }
@@ -34,91 +34,57 @@ impl Manipulation {
         may_be: impl Fn(&Self, usize) -> bool,
     ) -> bool {
         island.clear();
-        let is_whole =
-            !self.is_here(body) || (self.mark(body, island, &may_be) && self.mark_all_near(island, &may_be));
-        self.unmark(island);
-        island.sort_unstable();
-        is_whole
-    }
-
-    fn mark_all_near(&mut self, island: &mut Vec<usize>, may_be: &impl Fn(&Self, usize) -> bool) -> bool {
-        let mut seen = 0;
-        while seen < island.len() {
-            let new = std::mem::replace(&mut seen, island.len());
-            let fits = self.mark_rings(new, island, may_be)
-                && self.mark_near(island, false, may_be)
-                && self.mark_near(island, true, may_be);
-            if !fits {
-                return false;
-            }
-        }
-        true
-    }
-
-    /// Who sleeps wakes with all others of its ring.
-    fn mark_rings(
-        &mut self,
-        new: usize,
-        island: &mut Vec<usize>,
-        may_be: &impl Fn(&Self, usize) -> bool,
-    ) -> bool {
-        let mut at = new;
-        while let Some(&one) = island.get(at) {
-            at += 1;
-            let next = self.roster.next(one);
-            if self.roster.standing(one) == Standing::Asleep && !self.mark(next, island, may_be) {
-                return false;
-            }
-        }
-        true
-    }
-
-    /// One walk through all pairs, in order or against it: so that a chain of any length is found by one of both.
-    fn mark_near(
-        &mut self,
-        island: &mut Vec<usize>,
-        backwards: bool,
-        may_be: &impl Fn(&Self, usize) -> bool,
-    ) -> bool {
-        let count = self.pairs.key_count();
-        for at in 0..count {
-            let key = *self.pairs.key_at(if backwards { count - 1 - at } else { at });
-            if key.is_near
-                && let Some([one, other]) = self.bodies_of(&key)
-                && self.is_marked[one] != self.is_marked[other]
-                && !self.mark(if self.is_marked[one] { other } else { one }, island, may_be)
-            {
-                return false;
-            }
-        }
-        true
-    }
-
-    /// Takes a body that is here into the island; says whether there was room, and it may be there.
-    fn mark(&mut self, body: usize, island: &mut Vec<usize>, may_be: &impl Fn(&Self, usize) -> bool) -> bool {
-        if self.is_marked[body] || !self.is_here(body) {
+        if !self.is_here(body) {
             return true;
         }
-        let has_room = island.len() < island.capacity() && may_be(self, body);
-        if has_room {
-            self.is_marked[body] = true;
-            island.push(body);
+        self.join_what_could_touch();
+        let first = self.sets.first(body);
+        for other in 0..self.roster.bodies.len() {
+            if self.is_here(other) && self.sets.first(other) == first {
+                if island.len() == island.capacity() || !may_be(self, other) {
+                    return false;
+                }
+                island.push(other);
+            }
         }
-        has_room
+        true
+    }
+
+    /// Makes sets of those that are here and could touch, one by one.
+    fn join_what_could_touch(&mut self) {
+        self.sets.begin(self.roster.bodies.len());
+        for at in 0..self.pairs.key_count() {
+            let key = *self.pairs.key_at(at);
+            if key.is_near
+                && let Some([one, other]) = self.bodies_of(&key)
+                && self.is_here(one)
+                && self.is_here(other)
+            {
+                self.sets.join(one, other);
+            }
+        }
+        // Who sleeps wakes with all others of its ring.
+        for body in 0..self.roster.bodies.len() {
+            if self.roster.standing(body) == Standing::Asleep {
+                self.sets.join(body, self.roster.next(body));
+            }
+        }
+    }
+
+    /// Whether the island and something else that is stepped here could meet within this time (s).
+    pub fn is_met(&mut self, island: &[usize], entities: &[Entity], ahead_s: f64) -> bool {
+        island.iter().for_each(|&body| self.is_marked[body] = true);
+        let is_met = self.pairs.keys().filter_map(|key| self.bodies_of(key)).any(|[one, other]| {
+            self.is_marked[one] != self.is_marked[other]
+                && ![one, other].map(|body| self.roster.standing(body)).contains(&Standing::Elsewhere)
+                && self.could_meet([one, other], entities, ahead_s)
+        });
+        self.unmark(island);
+        is_met
     }
 
     pub(super) fn unmark(&mut self, island: &[usize]) {
         island.iter().for_each(|&body| self.is_marked[body] = false);
-    }
-
-    /// Whether the island and something else that is stepped here could meet within this time (s).
-    pub fn is_met(&self, island: &[usize], entities: &[Entity], ahead_s: f64) -> bool {
-        let is_in = |body: usize| island.binary_search(&body).is_ok();
-        self.pairs.keys().filter_map(|key| self.bodies_of(key)).any(|[one, other]| {
-            is_in(one) != is_in(other)
-                && ![one, other].map(|body| self.roster.standing(body)).contains(&Standing::Elsewhere)
-                && self.could_meet([one, other], entities, ahead_s)
-        })
     }
 
     /// Both bodies of a pair, if it is one of two.

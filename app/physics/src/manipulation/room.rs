@@ -9,6 +9,7 @@ use haptics::Entity;
 
 use super::{MAX_DRIVEN, Manipulation, who};
 use crate::collide::MAX_POINTS;
+use crate::integrator::Integrator;
 use crate::integrator::explicit::Kept;
 use crate::integrator::rk4::Stages;
 use crate::pairs::{Key, MorePairs};
@@ -30,6 +31,8 @@ pub(super) struct RowCounts {
     pub(super) of_pairs: usize,
     pub(super) of_fingers: usize,
     pub(super) bodies: usize,
+    /// Decides which lists a tick needs.
+    pub(super) integrator: Integrator,
 }
 
 /// Room that was made, or that was replaced by what was made.
@@ -61,13 +64,15 @@ pub(super) struct RowRoom {
 impl RowRoom {
     pub(super) fn new(counts: RowCounts) -> Self {
         let (rows, places) = (counts.of_pairs + counts.of_fingers, counts.bodies + MAX_DRIVEN);
+        let is_explicit = counts.integrator != Integrator::Implicit;
+        let has_stages = counts.integrator == Integrator::Rk4;
         Self {
             counts,
             rows: Vec::with_capacity(rows),
             solver: Solver::with_capacity(rows, places),
-            stages: Stages::with_capacity(rows, places),
+            stages: if has_stages { Stages::with_capacity(rows, places) } else { Stages::default() },
             restitution: Restitution::with_capacity(rows, places),
-            fixed: Vec::with_capacity(rows),
+            fixed: Vec::with_capacity(if is_explicit { rows } else { 0 }),
         }
     }
 }

@@ -5,7 +5,8 @@
 //! Model: no more than [so many](Manipulation::step_at_most) bodies are stepped in a tick. Three quarters of the places are for
 //! those that are nearest to the fingers; the others go round among all that is left. Who waits is [`Standing::Held`]: fixed
 //! where it is for who is stepped, like what sleeps. It keeps its velocity and goes on with it in its turn: what is far from
-//! fingers moves more slowly than it would.
+//! fingers moves more slowly than it would. What is [driven](Manipulation::drive) has to wait as well: it would go through who
+//! is fixed only for want of time ([`Manipulation::pace_of_driven`]).
 //! Invariants: nothing gets energy by it, for what is fixed does no work, and what a contact holds stays in its account; who a
 //! finger touches is stepped; no allocation.
 //! Cost: turns change once in [`TURN`] ticks, or where more woke than may be stepped: then a distance for each that is here,
@@ -14,8 +15,9 @@
 use haptics::Entity;
 use nalgebra::Vector3;
 
-use super::{Manipulation, who};
+use super::{MAX_DRIVEN, Manipulation, who};
 use crate::collide::bounding_ball;
+use crate::pair::REACH_M;
 use crate::roster::{Roster, Standing};
 use crate::touch::Touch;
 
@@ -28,6 +30,14 @@ pub(super) struct Turns {
     near: Vec<Vector3<f64>>,
     /// Those that wait, and some that do not any more.
     held: Vec<u32>,
+    /// Way that driven entities have gone in all ticks, of each tick the longest \[m\].
+    driven_way_m: f64,
+    /// The same when turns changed \[m\].
+    changed_at_m: f64,
+    /// The same when a body began to wait, of each that does \[m\]; of the others infinite.
+    held_at_m: Box<[f64]>,
+    /// Entities that were driven while somebody waited.
+    moved: Vec<u32>,
     /// Of each that is stepped or waits, how far it is from a finger \[m\].
     all: Vec<(f64, u32)>,
     /// Of each body, whether it is stepped from now on.
@@ -44,6 +54,10 @@ impl Turns {
             most: usize::MAX,
             near: Vec::with_capacity(MOST_NEAR),
             held: Vec::with_capacity(2 * bodies),
+            driven_way_m: 0.0,
+            changed_at_m: 0.0,
+            held_at_m: vec![f64::INFINITY; bodies].into(),
+            moved: Vec::with_capacity(2 * MAX_DRIVEN),
             all: Vec::with_capacity(bodies),
             is_chosen: vec![false; bodies].into(),
             last: 0,
@@ -53,6 +67,7 @@ impl Turns {
 
     /// Takes note of one that waits from now on.
     pub(super) fn hold(&mut self, body: usize) {
+        self.held_at_m[body] = self.driven_way_m;
         if self.held.len() < self.held.capacity() {
             self.held.push(body as u32);
         }
@@ -61,6 +76,25 @@ impl Turns {
     /// Turns change in the next tick.
     pub(super) fn change(&mut self) {
         self.change_at = 0;
+    }
+
+    /// Takes note that this entity was driven on.
+    pub(super) fn was_driven(&mut self, entity: usize) {
+        let entity = entity as u32;
+        if !self.held.is_empty() && self.moved.len() < self.moved.capacity() && !self.moved.contains(&entity)
+        {
+            self.moved.push(entity);
+        }
+    }
+
+    /// Takes note that none of those that were driven went farther than this \[m\].
+    pub(super) fn driven_went(&mut self, way_m: f64) {
+        self.driven_way_m += way_m;
+    }
+
+    /// How fast what is driven may go near this body, which waits, as a share of how fast it would.
+    pub(super) fn pace_near(&self, body: usize) -> f64 {
+        if self.driven_way_m - self.held_at_m[body] < MOST_WAY_M { SLOW } else { 0.0 }
     }
 
     /// True if so many are as many as may be stepped.
@@ -127,9 +161,12 @@ impl Manipulation {
         if !is_over && (self.turns.held.is_empty() || self.ticks < self.turns.change_at) {
             return;
         }
-        self.turns.change_at = self.ticks + TURN;
+        let is_driven_of_late = self.turns.driven_way_m > self.turns.changed_at_m;
+        self.turns.changed_at_m = self.turns.driven_way_m;
+        // What is driven waits for all near it, wherever the fingers are.
+        self.turns.change_at = self.ticks + if is_driven_of_late { TURN_WHILE_DRIVEN } else { TURN };
         self.see_all(entities, touches);
-        self.choose();
+        self.choose(is_driven_of_late);
         self.change_turns(entities);
     }
 
@@ -161,11 +198,16 @@ impl Manipulation {
         }
     }
 
-    /// Chooses the nearest, and those whose turn it is.
-    fn choose(&mut self) {
+    /// Chooses the nearest, for three quarters of the places or for one, and those whose turn it is.
+    fn choose(&mut self, has_few_nearest: bool) {
         let Turns { most, near, all, is_chosen, last, .. } = &mut self.turns;
         let most = (*most).min(all.len());
-        let nearest = if near.is_empty() { 0 } else { (most - most / 4).min(all.len()) };
+        let wanted = match near.is_empty() {
+            true => 0,
+            false if has_few_nearest => most / 4,
+            false => most - most / 4,
+        };
+        let nearest = wanted.min(all.len());
         if nearest > 0 && nearest < all.len() {
             all.select_nth_unstable_by(nearest - 1, |one, other| one.0.total_cmp(&other.0));
         }
@@ -187,17 +229,17 @@ impl Manipulation {
 
     /// Holds who is stepped and was not chosen, and wakes who was.
     fn change_turns(&mut self, entities: &mut [Entity]) {
-        let Self { turns: Turns { all, is_chosen, held, .. }, roster, .. } = self;
+        let Self { turns, roster, .. } = self;
         let standing = |roster: &Roster, body: u32| roster.standing(body as usize);
-        for &(_, body) in &*all {
-            if !is_chosen[body as usize] && standing(roster, body) == Standing::Awake {
+        for at in 0..turns.all.len() {
+            let body = turns.all[at].1;
+            if !turns.is_chosen[body as usize] && standing(roster, body) == Standing::Awake {
                 let entity = &mut entities[roster.entities[body as usize]];
                 entity.move_to(entity.X_WB);
-                if held.len() < held.capacity() {
-                    held.push(body);
-                }
+                turns.hold(body as usize);
             }
         }
+        let Turns { all, is_chosen, held, .. } = turns;
         let changes = all.iter().map(|&(_, body)| {
             let body = body as usize;
             (body, if is_chosen[body] { Standing::Awake } else { Standing::Held })
@@ -207,11 +249,42 @@ impl Manipulation {
         let is_awake = |body: usize| roster.standing(body) == Standing::Awake;
         let who = who(roster, entities, self.contacts);
         self.pairs.regroup(is_awake, &who);
+        self.meet_what_was_driven(entities);
+    }
+
+    /// Those whose turn it is now, and near which something was driven while they waited, look for what came near, and are pushed
+    /// as deep as it has come: who drives it has worked for that.
+    fn meet_what_was_driven(&mut self, entities: &[Entity]) {
+        let Self { turns, pairs, roster, broad_phase, contacts, .. } = self;
+        let Turns { all, is_chosen, held, held_at_m, driven_way_m, moved, .. } = turns;
+        let who = who(roster, entities, *contacts);
+        let resumes = |body: u32| is_chosen[body as usize] && held_at_m[body as usize] < *driven_way_m;
+        pairs.were_driven_among(moved, |body| resumes(body), &who);
+        for &(_, body) in &*all {
+            if resumes(body) {
+                pairs.meet(body as usize, &who, broad_phase, true);
+            }
+        }
+        for &(_, body) in &*all {
+            if is_chosen[body as usize] {
+                held_at_m[body as usize] = f64::INFINITY;
+            }
+        }
+        if held.is_empty() {
+            moved.clear();
+        }
     }
 }
 
 /// Turns last so many ticks.
 const TURN: u64 = 16;
+/// And so many while something is driven, which waits for all near it to have one.
+const TURN_WHILE_DRIVEN: u64 = 4;
+/// What is driven goes no farther than this, but for a tick, near who waits for its turn: less than contact points are
+/// [seen from](REACH_M) \[m\].
+const MOST_WAY_M: f64 = 0.5 * REACH_M;
+/// Until then it goes so much more slowly than it would.
+const SLOW: f64 = 0.125;
 /// Places of fingers and of what they hold.
 const MOST_NEAR: usize = 16;
 /// Advantage of those that are stepped: two that are as near do not take turns \[m\].

@@ -247,9 +247,33 @@ fn boxes_side_by_side_on_a_shelf_are_islands_of_their_own_until_they_touch() {
             entities.push(object(Cuboid::new([SIZE; 3]).unwrap(), pose, 1000.0, 0.5));
         }
         let mut manipulation = manipulation(&entities, true);
-        manipulation.step(&mut entities, &mut [], DT);
         let mut island = Vec::with_capacity(8);
-        assert!(manipulation.island(1, &mut island));
-        assert_eq!(island, if is_one { vec![0, 1, 2, 3] } else { vec![1] }, "{apart}");
+        // Before the first tick, in which pairs are looked at, as well as after it.
+        for _ in 0..2 {
+            assert!(manipulation.island(1, &mut island));
+            assert_eq!(island, if is_one { vec![0, 1, 2, 3] } else { vec![1] }, "{apart}");
+            manipulation.step(&mut entities, &mut [], DT);
+        }
     }
+}
+
+#[test]
+fn an_island_that_comes_where_all_that_may_be_is_stepped_waits_and_is_told_to_have_changed() {
+    let mut entities = vec![floor(0.0, 2000.0, 0.5)];
+    for at in 0..3 {
+        let pose = Isometry3::translation(SIZE * f64::from(at), 0.5 * SIZE, 0.0);
+        entities.push(object(Cuboid::new([SIZE; 3]).unwrap(), pose, 1000.0, 0.5));
+    }
+    let side =
+        |are_here: bool| Side { entities: entities.clone(), manipulation: manipulation(&entities, are_here) };
+    let [mut one, mut other] = [side(true), side(false)];
+    other.manipulation.step_at_most(1, std::iter::empty());
+    other.manipulation.step(&mut other.entities, &mut [], DT);
+    other.manipulation.forget_changes();
+    send(&mut one, &mut other, 1);
+    let standings = [0, 1, 2].map(|body| other.manipulation.standing(body));
+    assert_eq!(standings, [Standing::Held; 3]);
+    let mut changed = other.manipulation.changed().to_vec();
+    changed.sort_unstable();
+    assert_eq!(changed, [0, 1, 2]);
 }

@@ -164,3 +164,60 @@ fn a_touch_tells_with_how_much_those_that_wait_hold_its_body() {
     // It pushes nobody.
     assert_eq!(leans(4, -0.521), 0);
 }
+
+/// A tray of a floor and four walls, driven as orders do it: all of them, or none while one of them is held up.
+#[test]
+fn what_lies_in_a_tray_that_is_driven_stays_in_it_however_few_are_stepped() {
+    const WAY_M: f64 = 0.1;
+    let (inner_m, thick_m) = (0.09, 0.01);
+    let tray = [[0.0, 0.0], [1.0, 0.0], [-1.0, 0.0], [0.0, 1.0], [0.0, -1.0]].map(|[x, z]| {
+        let long_m = 2.0 * (inner_m + thick_m);
+        let (size, y) = match (x, z) {
+            (0.0, 0.0) => ([long_m, thick_m, long_m], -0.5 * thick_m),
+            (_, 0.0) => ([thick_m, 0.06, long_m], 0.03),
+            _ => ([long_m, 0.06, thick_m], 0.03),
+        };
+        let middle_m = inner_m + 0.5 * thick_m;
+        object(Cuboid::new(size).unwrap(), Isometry3::translation(x * middle_m, y, z * middle_m), 2000.0, 0.5)
+    });
+    let mut entities = Vec::from(tray);
+    for at in 0..49 {
+        let [x, z] = [at % 7, at / 7].map(|at| 0.024 * f64::from(at) - 0.072);
+        entities.push(object(
+            Cuboid::new([0.02; 3]).unwrap(),
+            Isometry3::translation(x, 0.01, z),
+            1000.0,
+            0.4,
+        ));
+    }
+    let bodies: Vec<_> = (5..entities.len()).map(|index| (index, body(&entities[index], 0.02))).collect();
+    let settings = Settings {
+        contact_stiffness: physics::ContactStiffness::ByMass { damping_ratio: 1.0 },
+        sleep: Some(physics::Sleep::default()),
+        ..Settings::default()
+    };
+    let mut world = World::new(entities, &bodies, settings, 1);
+    let begin_W: Vec<_> = world.entities[..5].iter().map(|part| part.X_WB.translation.vector).collect();
+    let (mut t, mut waited, mut x_m) = (0.0_f64, 0, 0.0);
+    for tick in 0..40_000 {
+        world.manipulation.step_at_most(12, std::iter::empty());
+        let pace = (0..5).map(|part| world.manipulation.pace_of_driven(part)).fold(1.0, f64::min);
+        if tick >= 1000 {
+            t = (t + pace * DT).min(1.0);
+            x_m = WAY_M * t * t * t * (10.0 - 15.0 * t + 6.0 * t * t);
+        }
+        waited += u32::from(pace == 0.0);
+        for (part, from_W) in begin_W.iter().enumerate() {
+            let to_W = Isometry3::from(nalgebra::Translation3::from(from_W + Vector3::x() * x_m));
+            assert!(world.manipulation.drive(part, to_W));
+        }
+        world.step(&[]);
+        for (number, body) in world.manipulation.bodies().iter().enumerate() {
+            let in_tray = body.centre_W - Vector3::x() * x_m;
+            // Half of an edge's length from where it would be half in a wall, or in the floor.
+            let is_in = in_tray.x.abs() < inner_m && in_tray.z.abs() < inner_m && in_tray.y > 0.0;
+            assert!(is_in, "{number} in tick {tick}: {in_tray:?}");
+        }
+    }
+    assert!(t == 1.0 && waited > 1000, "{t} {waited}");
+}

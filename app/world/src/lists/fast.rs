@@ -50,6 +50,8 @@ pub struct FastList {
     here: Vec<u32>,
     /// Which of these is looked at next for being given away.
     next: usize,
+    /// The tick from which on it is.
+    look_at: u64,
     island: Vec<usize>,
     /// Boxes in which fingers could be soon, and in which they are.
     soon: Vec<Aabb>,
@@ -78,6 +80,7 @@ impl FastList {
             stays: vec![u32::from(all_slow); bodies].into(),
             here: all_here(bodies, all_slow),
             next: 0,
+            look_at: 0,
             island: Vec::with_capacity(bodies),
             soon: Vec::with_capacity(MOST_FINGERS + MAX_DRIVEN),
             around: Vec::with_capacity(MOST_FINGERS + MAX_DRIVEN),
@@ -194,7 +197,8 @@ impl FastList {
 
     /// After a tick: gives an island away that nobody is near, if there is more here than there should be.
     pub fn end_tick(&mut self, manipulation: &mut Manipulation, entities: &[Entity]) {
-        if !self.send(manipulation, entities) || self.here.len() <= self.settings.fast_bodies {
+        let is_too_soon = self.tick < self.look_at;
+        if !self.send(manipulation, entities) || self.here.len() <= self.settings.fast_bodies || is_too_soon {
             return;
         }
         for _ in 0..LOOKED_AT.min(self.here.len()) {
@@ -315,6 +319,8 @@ impl FastList {
             self.handed.went += island.len() as u64;
             manipulation.release(&island, entities);
             self.send(manipulation, entities);
+        } else {
+            self.look_at = self.tick + (manipulation.pair_count() / KEYS_A_TICK) as u64;
         }
         self.island = island;
     }
@@ -342,6 +348,8 @@ fn is_finite(finger: &Reach) -> bool {
     finger.hip_W.iter().chain(finger.velocity_W.iter()).all(|x| x.is_finite())
 }
 
+/// An island is looked for among all pairs: where one may not go the next one waits, so that a tick pays for so many.
+const KEYS_A_TICK: usize = 128;
 /// So many bodies are looked at in a tick for being given away.
 const LOOKED_AT: usize = 4;
 /// So many parcels are sent in a tick.
