@@ -38,6 +38,7 @@ mod extremes;
 mod face;
 mod facing;
 mod fan;
+mod fan_crossing;
 mod fit;
 mod fold;
 mod hole;

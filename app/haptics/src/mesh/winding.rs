@@ -46,6 +46,16 @@ impl Parts {
     }
 }
 
+#[cfg(test)]
+impl Parts {
+    /// Parts of a mesh that is built.
+    pub(super) fn of_faces(faces: &[super::Face]) -> Self {
+        let links: Vec<_> = faces.iter().map(|face| face.links).collect();
+        let (states, all) = flood(&links);
+        Self { of_face: states.iter().map(|state| state.part).collect(), all }
+    }
+}
+
 /// Turns faces over where needed, and notes what was found.
 pub(super) fn orient(triangles: &mut [Triangle], links: &mut [[Link; 3]], report: &mut MeshReport) -> Parts {
     let (mut states, mut parts) = flood(links);
