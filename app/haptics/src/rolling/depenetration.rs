@@ -87,8 +87,11 @@ pub(super) fn grown<F: Foot>(
         }
         larger.give_way(&{ small.centre_B });
         if let Some(mut larger) = with_room(ground, larger) {
+            // Pushed out of one thing after the other it may have come too far.
+            larger.press_from(hip_B);
             if !larger.touches_all_that_holds_it() {
                 larger = larger.on_what_holds_it(ground);
+                larger.press_from(hip_B);
             }
             // A foot that was left behind in the air would bear what is not there.
             if larger.touches_all_that_holds_it() && (larger.centre_B - hip_B).norm() <= at_most_m {

@@ -12,6 +12,7 @@ use nalgebra::Vector3;
 use super::ball::{Ball, Rest, SAME_FOOT, distance, tolerance_m};
 use super::ground::{Foot, Ground};
 use super::press::{MOST, Plane, onto, press};
+use crate::mesh::TooMany;
 use crate::tangent_view::tangential;
 
 /// How it came to where it met something.
@@ -203,12 +204,17 @@ impl<F: Foot> Ball<F> {
 
     /// Moves to the place nearest to `hip_B` in front of all that it touches.
     pub(super) fn give_way(&mut self, hip_B: &Vector3<f64>) {
+        self.centre_B = self.press_from(hip_B);
+    }
+
+    /// Loads that a HIP there presses with on all that it knows; gives the place nearest to it in front of that.
+    pub(super) fn press_from(&mut self, hip_B: &Vector3<f64>) -> Vector3<f64> {
         let (planes, count) = self.planes();
         let pressed = press(&planes[..count], hip_B);
         for (rest, load_m) in self.rests_mut().iter_mut().zip(pressed.loads_m) {
             rest.load_m = load_m;
         }
-        self.centre_B = pressed.point_B;
+        pressed.point_B
     }
 
     /// Of a place that was guessed: whether it is as far from everything that presses on it as it may be.
@@ -226,15 +232,24 @@ impl<F: Foot> Ball<F> {
         self.rests().iter().filter(|rest| rest.load_m > 0.0).all(|rest| self.touches(rest))
     }
 
-    /// Where rounds ended before it had settled: on what presses on it, if there is room, else without what it has not come
-    /// to yet. A foot in the air must carry nothing.
+    /// Where rounds ended before it had settled: on what presses on it and what is in its way there, else without what it has
+    /// not come to yet. A foot in the air must carry nothing.
     #[inline(never)]
     pub(super) fn on_what_holds_it(&self, ground: &impl Ground<Foot = F>) -> Self {
         let mut settled = *self;
         settled.settle(ground);
-        let is_there = settled.touches_all_that_holds_it() && settled.is_within_half_a_radius_of(self);
-        if is_there && matches!(settled.obstacle(ground), Ok(None)) {
-            return settled;
+        for _ in 0..MOST_SETTLED {
+            if !settled.touches_all_that_holds_it() || !settled.is_within_half_a_radius_of(self) {
+                break;
+            }
+            match settled.obstacle(ground) {
+                Ok(None) => return settled,
+                Ok(Some(obstacle)) => {
+                    let way = Leg { from_B: settled.centre_B, is_frictionless: true };
+                    settled = settled.pushed_out_of(ground, &obstacle, &way);
+                }
+                Err(TooMany) => break,
+            }
         }
         let mut ball = *self;
         ball.count = 0;
@@ -255,3 +270,5 @@ impl<F: Foot> Ball<F> {
 /// What is farther than the radius by more than this share of it is not touched any longer.
 const BAND: f64 = 1e-7;
 const MOST_CORRECTIONS: usize = 6;
+/// How often a ball that has not settled is pushed out of what is in its way.
+const MOST_SETTLED: usize = 3;

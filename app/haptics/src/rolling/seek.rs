@@ -87,8 +87,13 @@ fn seek_with<G: Ground>(
     let mut sees = None;
     // Where it was last before it moved.
     let mut from_B = start.centre_B;
+    // Where it last touched all that carried a load.
+    let mut settled = None;
     for _ in 0..rounds {
         let look = ball.look(ground, input);
+        if G::IS_BENT && is_careful && ball.touches_all_that_holds_it() {
+            settled = Some(ball);
+        }
         if look.is_free {
             if !is_careful {
                 return Sought::Unsure;
@@ -180,6 +185,10 @@ fn seek_with<G: Ground>(
             return Sought::Unsure;
         }
         (ball, sees) = (ball.on_what_holds_it(ground), None);
+        // In a hollow of about its own radius all is about as near: there it may not settle in any number of steps.
+        if !sees_all_that_holds(&mut ball, &sees, ground, input) {
+            ball = settled.unwrap_or(ball);
+        }
     }
     let (look, tangential_B) = match sees {
         Some(sees) => sees,

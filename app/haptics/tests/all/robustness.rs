@@ -205,51 +205,108 @@ proptest! {
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(200))]
 
-    /// Of a ball's loads together, wherever it is wedged; and nothing is nearer to its centre than its radius.
     #[test]
     fn a_ball_on_a_tree_stays_within_the_friction_cones_of_all_that_it_touches(
         which in 0..7usize, friction in any_friction(), radius in 5e-4..8e-3f64,
         hips in prop::collection::vec(prop::array::uniform3(-1.1..1.1f64), 2..12), steps in 1..60u32,
     ) {
-        let tree = &trees::all()[which];
-        let entity = trees::touchable(&tree.tree, friction.clone());
-        let csg = trees::built(&tree.tree);
-        let mut finger = Finger::new(radius, 1).unwrap().with_ramp_in(0.0).unwrap();
-        let mut from = Vector3::new(2.0, 2.1, 1.9);
-        for hip in hips {
-            let to = Vector3::from(hip);
-            for i in 1..=steps {
-                let at = from + (to - from) * (f64::from(i) / f64::from(steps));
-                finger.step(std::slice::from_ref(&entity), &(at * tree.size_m), DT);
-                let points = finger.touch_points(std::slice::from_ref(&entity), 0);
-                let (mut loads_n, mut sum) = (0.0, Vector3::zeros());
-                let mut touched_by_m: Option<f64> = None;
-                for point in points.as_slice() {
-                    loads_n += point.force_on_user_W.dot(&point.normal_W);
-                    sum += point.force_on_user_W;
-                    let Some(contact) = finger.contact(0) else { continue };
-                    let distance_m = (point.point_W - contact.god_object_W).norm();
-                    // A ball that has leapt to where there is no room for it is smaller; in all places it is as large.
-                    let touched_by_m = *touched_by_m.get_or_insert(distance_m);
-                    // What is touched still; and an edge is where both patches are within a millionth of its coordinates.
-                    let off_m = 1e-6 * (radius + point.point_W.amax());
-                    prop_assert!((distance_m - touched_by_m).abs() <= off_m, "{distance_m:e} {contact:?}");
-                    prop_assert!(distance_m <= radius + off_m, "{distance_m:e} {contact:?}");
-                    prop_assert!(steps < 10 || distance_m >= radius - off_m, "{distance_m:e} {contact:?}");
-                    prop_assert!(csg.signed_distance(&point.point_W).abs() < 1e-11, "{point:?}");
-                }
-                let Some(contact) = finger.contact(0) else { continue };
-                prop_assert!((sum - contact.force_on_user_W).norm() <= 1e-9 * (1.0 + loads_n));
-                prop_assert!(csg.signed_distance(&contact.god_object_W) > 0.0, "{contact:?}");
-                if let Some(mu) = largest_ratio(&friction, loads_n) {
-                    let normal: Vector3<f64> = points.as_slice().iter().map(|p| p.normal_W * p.force_on_user_W.dot(&p.normal_W)).sum();
-                    let tangential_n = (sum - normal).norm();
-                    prop_assert!(tangential_n <= mu * loads_n + 1e-6 * (1.0 + loads_n), "{mu} {tangential_n} {loads_n} {contact:?}");
-                }
-            }
-            from = to;
-        }
+        stays_within_the_cones(which, &friction, radius, &hips, steps)?;
     }
+}
+
+/// Of a ball's loads together, wherever it is wedged; and nothing is nearer to its centre than its radius.
+fn stays_within_the_cones(
+    which: usize,
+    friction: &Friction,
+    radius: f64,
+    hips: &[[f64; 3]],
+    steps: u32,
+) -> Result<(), TestCaseError> {
+    let tree = &trees::all()[which];
+    let entity = trees::touchable(&tree.tree, friction.clone());
+    let csg = trees::built(&tree.tree);
+    let mut finger = Finger::new(radius, 1).unwrap().with_ramp_in(0.0).unwrap();
+    let mut from = Vector3::new(2.0, 2.1, 1.9);
+    for &hip in hips {
+        let to = Vector3::from(hip);
+        for i in 1..=steps {
+            let at = from + (to - from) * (f64::from(i) / f64::from(steps));
+            finger.step(std::slice::from_ref(&entity), &(at * tree.size_m), DT);
+            let points = finger.touch_points(std::slice::from_ref(&entity), 0);
+            let (mut loads_n, mut sum) = (0.0, Vector3::zeros());
+            let mut touched_by_m: Option<f64> = None;
+            for point in points.as_slice() {
+                loads_n += point.force_on_user_W.dot(&point.normal_W);
+                sum += point.force_on_user_W;
+                let Some(contact) = finger.contact(0) else { continue };
+                let distance_m = (point.point_W - contact.god_object_W).norm();
+                // A ball that has leapt to where there is no room for it is smaller; in all places it is as large.
+                let touched_by_m = *touched_by_m.get_or_insert(distance_m);
+                // What is touched still; and an edge is where both patches are within a millionth of its coordinates.
+                let off_m = 1e-6 * (radius + point.point_W.amax());
+                prop_assert!((distance_m - touched_by_m).abs() <= off_m, "{distance_m:e} {contact:?}");
+                prop_assert!(distance_m <= radius + off_m, "{distance_m:e} {contact:?}");
+                prop_assert!(steps < 10 || distance_m >= radius - off_m, "{distance_m:e} {contact:?}");
+                prop_assert!(csg.signed_distance(&point.point_W).abs() < 1e-11, "{point:?}");
+            }
+            let Some(contact) = finger.contact(0) else { continue };
+            prop_assert!((sum - contact.force_on_user_W).norm() <= 1e-9 * (1.0 + loads_n));
+            prop_assert!(csg.signed_distance(&contact.god_object_W) > 0.0, "{contact:?}");
+            if let Some(mu) = largest_ratio(friction, loads_n) {
+                let normal: Vector3<f64> =
+                    points.as_slice().iter().map(|p| p.normal_W * p.force_on_user_W.dot(&p.normal_W)).sum();
+                let tangential_n = (sum - normal).norm();
+                prop_assert!(
+                    tangential_n <= mu * loads_n + 1e-6 * (1.0 + loads_n),
+                    "{mu} {tangential_n} {loads_n} {contact:?}"
+                );
+            }
+        }
+        from = to;
+    }
+    Ok(())
+}
+
+/// The hollow is as tight as the ball, so that all of it is about as near: it did not settle, and pressed on what it was 0.07 um
+/// away from.
+#[test]
+fn a_ball_in_a_hollow_of_its_own_radius_touches_all_that_holds_it() {
+    let hips = [
+        [0.8034402841330721, -0.709375252106668, 1.0640466167765292],
+        [1.0023804237225842, -0.5707789698202086, -0.6707680139991665],
+        [-0.032045023175403135, 0.23858687117634345, 0.0023723248244507723],
+        [-0.5545639235954066, -0.646591567761448, -0.09667484873855023],
+        [-0.5088434432575808, 0.21183108005047624, 0.018994456183374208],
+        [0.11339986048501592, -0.645034027233078, 0.48186972721358934],
+        [0.8456834602744794, -0.7289762584033229, -0.18008808961086972],
+        [-0.20031711038802053, 0.4558942291794332, -0.27878510028570114],
+    ];
+    stays_within_the_cones(5, &Friction::None, 0.0034368997534865078, &hips, 3).unwrap();
+    let hips = [
+        [0.309775242616974, 0.42316069711650844, -0.17861026249593323],
+        [-0.7488447437231011, -0.13083806768349532, -0.5179117800450254],
+        [-0.3114904797127342, 0.02434656749501718, 0.5403628748262085],
+        [1.011650334904883, -0.07718628059096995, 0.38187479320778145],
+        [0.6135070016592975, 0.5818999998659552, -0.49831709688647374],
+        [0.9404344750880056, -0.02405789843097194, 0.5669309159821178],
+        [-0.9622427727588251, -0.21485919280022975, -0.8037783652964577],
+        [0.9836088953760258, -0.9653557254187631, 0.2509438233016362],
+        [-0.18525134279403596, -0.7645445980581844, -0.7740921806105827],
+        [0.20569810389881754, -0.46863747738552364, -0.6363206108127328],
+        [0.39300789278738757, -0.18016794650218423, -1.0945993823821596],
+    ];
+    stays_within_the_cones(5, &Friction::None, 0.0034193461452351123, &hips, 48).unwrap();
+}
+
+/// A small ball in a pip of a die grows, and comes out over its rim: it hung 0.26 mm above that.
+#[test]
+fn a_ball_that_grows_out_of_a_pip_touches_all_that_holds_it() {
+    let friction = Friction::CoulombViscous { mu: 1.9533421313515131, mu_v_s_per_m: 0.0 };
+    let hips = [
+        [0.2267257002119097, 0.5961561193500069, 0.7192335596609926],
+        [0.37349809661616856, 0.0, 1.0816735319103299],
+    ];
+    stays_within_the_cones(4, &friction, 0.006934472582147894, &hips, 1).unwrap();
 }
 
 fn any_height_map() -> impl Strategy<Value = HeightMap> {
