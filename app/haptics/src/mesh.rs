@@ -79,7 +79,7 @@ pub use mesh_cone::{Beginning, MeshCone};
 pub use normals::{SHARPEST_CREASE_RAD, VertexNormals};
 pub(crate) use repair::area_vector;
 pub(crate) use report::plural;
-pub use report::{Finding, MeshReport, NarrowGaps, OpenHole, OpenHoles};
+pub use report::{Finding, MeshReport, NarrowGaps, OpenHole, OpenHoles, ShortRims};
 pub(crate) use rolling::BallOnMesh;
 pub use soup::TriangleSoup;
 pub use uv::CornerUv;

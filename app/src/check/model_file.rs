@@ -288,6 +288,7 @@ fn to_json(
             "is_solid": mesh.sides() == Sides::Solid, "has_inside": mesh.has_inside(),
             "faces_of_lids": is_lid.iter().filter(|is_lid| **is_lid).count(),
             "open_holes": report.open_holes.count, "largest_open_holes": holes,
+            "short_rims": report.short_rims.edges, "widest_short_gap": report.short_rims.widest_m,
             "low": [low.x, low.y, low.z], "high": [high.x, high.y, high.z], "area": area,
             "volume": (mesh.sides() == Sides::Solid).then_some(volume),
             "names": understood.faces_by_name(),

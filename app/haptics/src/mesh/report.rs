@@ -2,6 +2,8 @@
 
 use std::fmt;
 
+use nalgebra::Vector3;
+
 /// How often something was found, and where first.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Finding {
@@ -101,6 +103,41 @@ impl fmt::Display for NarrowGaps {
     }
 }
 
+/// Rims of open parts that end a little before another part.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct ShortRims {
+    /// Number of edges.
+    pub edges: usize,
+    /// The widest gap (m).
+    pub widest_m: f64,
+    /// The middle of the edge with the widest gap (m).
+    pub widest_B: [f64; 3],
+}
+
+impl ShortRims {
+    /// Counts one more.
+    pub(super) fn note(&mut self, gap_m: f64, middle_B: Vector3<f64>) {
+        self.edges += 1;
+        if gap_m > self.widest_m {
+            (self.widest_m, self.widest_B) = (gap_m, middle_B.into());
+        }
+    }
+}
+
+impl fmt::Display for ShortRims {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let [x, y, z] = self.widest_B.map(|x| if x.abs() < ROUNDING { 0.0 } else { short(x) });
+        write!(
+            f,
+            "{} {} before another part, up to {} m away (there at [{x}, {y}, {z}]): a finger that is smaller than such a gap gets \
+             through; make both meet if they should",
+            self.edges,
+            plural(self.edges, "edge of an open rim ends", "edges of open rims end"),
+            short(self.widest_m)
+        )
+    }
+}
+
 /// What a mesh is made of, and what had to be done to the input to make it.
 ///
 /// Indices are those of the input, from 0: of faces, unless a field says vertices.
@@ -150,6 +187,8 @@ pub struct MeshReport {
     pub boundary_edges: Finding,
     /// Those of them that lie on other faces.
     pub sealed_edges: usize,
+    /// Those of them that end a little before another part: by more than rounding, and by less than a hundredth of the extent.
+    pub short_rims: ShortRims,
     /// Edges across which inside and outside change places: the mesh cannot be oriented.
     pub turned_edges: Finding,
     /// Faces of the mesh that others pass through.
@@ -256,6 +295,9 @@ impl fmt::Display for MeshReport {
         }
         if self.narrow_gaps.faces > 0 {
             write!(f, "\n{}", self.narrow_gaps)?;
+        }
+        if self.short_rims.edges > 0 {
+            write!(f, "\n{}", self.short_rims)?;
         }
         if self.open_holes.count > 0 {
             write!(f, "\n{}", self.open_holes)?;

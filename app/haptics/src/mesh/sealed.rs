@@ -8,10 +8,13 @@
 //! there together. A part is sealed if all its rims are. In doubt it is not. Where faces lie along any rim, points
 //! [roll](Mesh::point_radius_m): a walk over neighbours would pass below what ends there.
 //!
-//! Cost: a look at what is near for each rim, bounded for all together.
+//! Of a rim that ends a little before another part the gap is measured: the largest of some places' distances from that part.
+//!
+//! Cost: two looks at what is near for each rim, bounded for all together.
 
 use nalgebra::Vector3;
 
+use super::bvh::closest_on;
 use super::winding::Parts;
 use super::{Face, Mesh, MeshReport, Sides};
 use crate::surface::direction_or_up;
@@ -43,6 +46,7 @@ impl Mesh {
     pub(super) fn note_sealed(&self, parts: &Parts, report: &mut MeshReport) -> bool {
         let [mut has_rim, mut is_open] = [false; 2].map(|no| vec![no; parts.len()]);
         let (mut do_meet, mut looks) = (false, MOST_LOOKS);
+        let mut looks_beside = if parts.len() > 1 { MOST_LOOKS_BESIDE } else { 0 };
         for (number, face) in self.faces.iter().enumerate() {
             for side in (0..3).filter(|&side| face.links[side].is_boundary()) {
                 let [from, to] =
@@ -50,9 +54,13 @@ impl Mesh {
                 let way = to - from;
                 let inward = direction_or_up(&face.normal_B.cross(&way));
                 has_rim[parts.of(number)] = true;
-                match self.along(&Edge { face: number, from, way, inward }, &mut looks) {
+                let edge = Edge { face: number, from, way, inward };
+                match self.along(&edge, &mut looks) {
                     Along::All => report.sealed_edges += 1,
                     found => {
+                        if let Some(gap_m) = self.gap_m(&edge, parts, &mut looks_beside) {
+                            report.short_rims.note(gap_m, from + 0.5 * way);
+                        }
                         is_open[parts.of(number)] = true;
                         do_meet |= matches!(found, Along::Some);
                         continue;
@@ -76,8 +84,42 @@ impl Mesh {
         do_meet
     }
 
+    /// Nearer to a face is on it.
+    fn on_m(&self) -> f64 {
+        (ON * self.extent_m).min(NARROW * self.least_ball_m())
+    }
+
+    /// How far an edge is from other parts, if that is little and more than nothing.
+    fn gap_m(&self, edge: &Edge, parts: &Parts, looks: &mut usize) -> Option<f64> {
+        let near_m = BESIDE * self.extent_m;
+        let (middle_B, half) = (edge.from + 0.5 * edge.way, 0.5 * edge.way.abs().add_scalar(2.0 * near_m));
+        let places_B = [0.0, 0.25, 0.5, 0.75, 1.0].map(|share| edge.from + share * edge.way);
+        let most = *looks;
+        let mut found = ([near_m * near_m; 5], most);
+        let key = |_: &([f64; 5], usize), at_B: &Vector3<f64>, size: &Vector3<f64>| {
+            let is_near = (0..3).all(|axis| (at_B[axis] - middle_B[axis]).abs() <= size[axis] + half[axis]);
+            is_near.then_some(0.0)
+        };
+        let visit = |(least_m2, looks): &mut ([f64; 5], usize), number: u32| {
+            *looks = looks.saturating_sub(1);
+            if parts.of(number as usize) != parts.of(edge.face) {
+                let face = &self.faces[number as usize];
+                let corners = self.triangles().corners(face);
+                for (place_B, least_m2) in places_B.iter().zip(least_m2) {
+                    let closest = closest_on(face, &corners, place_B, *least_m2);
+                    *least_m2 = closest.map_or(*least_m2, |closest| least_m2.min(closest.squared_distance));
+                }
+            }
+            *looks > 0
+        };
+        let is_done = self.bvh.for_each_face_in_boxes(&mut found, key, visit, most);
+        *looks = found.1;
+        let gap_m = found.0.into_iter().fold(0.0, f64::max).sqrt();
+        (is_done && gap_m > self.on_m() && gap_m < near_m).then_some(gap_m)
+    }
+
     fn along(&self, edge: &Edge, looks: &mut usize) -> Along {
-        let on_m = (ON * self.extent_m).min(NARROW * self.least_ball_m());
+        let on_m = self.on_m();
         let (middle_B, half) = (edge.from + 0.5 * edge.way, 0.5 * edge.way.abs().add_scalar(2.0 * on_m));
         let most = *looks;
         let mut found = Found { covered: Vec::new(), looks: most };
@@ -157,3 +199,7 @@ const HALF: f64 = 0.5;
 const UPON: f64 = 1e-3;
 /// Boxes and faces that are looked at, for all rims.
 const MOST_LOOKS: usize = 20_000_000;
+/// Of the extent: a rim that is farther from other parts has nothing to do with them.
+const BESIDE: f64 = 1e-2;
+/// Faces that are looked at for how far rims are from other parts: about a second.
+const MOST_LOOKS_BESIDE: usize = 5_000_000;

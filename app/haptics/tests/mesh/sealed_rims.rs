@@ -353,3 +353,50 @@ fn below_a_wall_that_is_short_by_a_rounding_no_finger_gets() {
         }
     }
 }
+
+/// Whoever made a wall that is short by more than a rounding learns by how much, and where.
+#[test]
+fn a_wall_that_ends_before_a_floor_is_told_with_its_gap() {
+    let mut noise = Noise(9);
+    for round in 0..40 {
+        let gap_m = [1e-6, 2e-5, 1e-4, 9e-4][round % 4];
+        let mut turn = || noise.between(-1.0, 1.0);
+        let pose = Isometry3::new(
+            Vector3::new(turn(), turn(), turn()) * 0.02,
+            Vector3::new(turn(), turn(), turn()) * 3.0,
+        );
+        let mut bell: Vec<Quad> = cuboid([0.1, 0.08, 0.08])
+            .into_iter()
+            .enumerate()
+            .filter(|(side, _)| *side != 2)
+            .map(|(_, quad)| quad)
+            .collect();
+        for corner in bell.as_flattened_mut() {
+            *corner = [corner[0] - 0.05, corner[1] + gap_m, corner[2] - 0.04];
+        }
+        let floor = [[-0.15, 0.0, -0.15], [-0.15, 0.0, 0.15], [0.15, 0.0, 0.15], [0.15, 0.0, -0.15]];
+        let mut all = soup(&with(bell, &[floor]));
+        let at = |at: Vector3<f64>| (pose * nalgebra::Point3::from(at)).coords;
+        all.vertices.iter_mut().for_each(|vertex| *vertex = at(*vertex));
+        let (_, report) = Mesh::build_closing(all, CloseHoles::UpTo(0.0)).unwrap();
+        let told = report.short_rims;
+        assert_eq!(told.edges, 4, "{gap_m}: {report}");
+        assert!((told.widest_m - gap_m).abs() < 1e-6 * gap_m + 1e-15, "{gap_m}: {report}");
+        let there = pose.inverse_transform_point(&nalgebra::Point3::from(told.widest_B));
+        assert!(
+            (there.y - gap_m).abs() < 1e-12 && there.x.abs() < 0.0501 && there.z.abs() < 0.0401,
+            "{there}"
+        );
+        let words = report.to_string();
+        assert!(words.contains("4 edges of open rims end before another part, up to "), "{words}");
+    }
+    // What is far from everything, and what lies upon it, is no gap.
+    for gap_m in [0.0, 0.02] {
+        let mut bell: Vec<Quad> = cuboid([0.1, 0.08, 0.08])[..].to_vec();
+        bell.remove(2);
+        bell.iter_mut().flatten().for_each(|corner| corner[1] += gap_m);
+        let floor = [[-0.15, 0.0, -0.15], [-0.15, 0.0, 0.15], [0.15, 0.0, 0.15], [0.15, 0.0, -0.15]];
+        let (_, report) = Mesh::build_closing(soup(&with(bell, &[floor])), CloseHoles::UpTo(0.0)).unwrap();
+        assert_eq!(report.short_rims.edges, 0, "{gap_m}: {report}");
+    }
+}
