@@ -17,7 +17,7 @@ use nalgebra::Vector3;
 use super::Mesh;
 use super::crack::over_ledge;
 use super::place::{Facet, On, Place, Side, previous};
-use super::walk::{Reached, cross_face, plane_through, rim};
+use super::walk::{RIM, Reached, cross_face, plane_through, rim};
 
 /// Goes along the line in which two faces cross: to the target, or to the first of their edges on the way.
 pub(super) fn follow_crossing(
@@ -78,6 +78,7 @@ pub(super) fn meet_others(mesh: &Mesh, place: Place, reached: Reached, hip_B: &V
             let here = on_rim(Place::new(hit.point_B, On::Face(side)));
             let side = face_of_line(mesh, here, met.side(), &to_hip_B);
             let other = face_of_line(mesh, met, side, &to_hip_B);
+            let other = if goes_away_in_fold(mesh, [met.side(), other], &way_B) { met.side() } else { other };
             return Reached::Rim(Place::new(hit.point_B, On::Crossing(side, other)));
         }
         passed[passing] = hit.face;
@@ -97,6 +98,16 @@ fn face_of_line(mesh: &Mesh, on: On, other: Side, to_hip_B: &Vector3<f64>) -> Si
     };
     let edge = edges_at(on).into_iter().flatten().find(leads_out);
     edge.and_then(|edge| side.across(here.face.links[edge])).unwrap_or(side)
+}
+
+/// True if a way that comes into the first of two neighbours goes away from the other one, at the foot of a fold between them:
+/// that one is not in its way, and to follow it leads to the first again, for ever.
+fn goes_away_in_fold(mesh: &Mesh, [met, other]: [Side; 2], way_B: &Vector3<f64>) -> bool {
+    let [met, other] = [met, other].map(|side| Facet::of(mesh, side));
+    let rise_m = |corner_B: Vector3<f64>| -met.depth_m(&corner_B);
+    other.normal_B.dot(way_B) > 0.0
+        && met.normal_B.dot(way_B) < 0.0
+        && other.corners_B(mesh).into_iter().map(rise_m).fold(0.0, f64::max) > RIM * mesh.extent_m()
 }
 
 /// Those edges of its face on which a place lies.

@@ -23,7 +23,7 @@ pub(crate) fn all(seed: u64) -> Vec<(&'static str, TriangleSoup)> {
 }
 
 /// A ball whose vertices went astray by about this much: where that is more than an edge, it folds and passes through itself.
-fn crumpled(noise: &mut Noise, subdivisions: u32, by_m: f64) -> TriangleSoup {
+pub(crate) fn crumpled(noise: &mut Noise, subdivisions: u32, by_m: f64) -> TriangleSoup {
     let mut soup = icosphere(subdivisions, 0.05);
     soup.vertices.iter_mut().for_each(|v| *v += noise.vector(by_m));
     soup
@@ -45,6 +45,25 @@ fn heap(noise: &mut Noise, boxes: usize) -> TriangleSoup {
         let turn = Rotation3::new(noise.vector(2.0));
         (part, turn, unit_vector(noise) * noise.between(0.0, 0.04))
     })
+}
+
+/// Closed parts that overlap, as artists put them together: boxes, tubes, balls as scanners see them.
+pub(crate) fn overlapping(noise: &mut Noise, parts: usize) -> TriangleSoup {
+    together(noise, parts, |noise| {
+        let part = match (noise.uniform() * 4.0) as u32 {
+            0 => tube(noise.between(0.005, 0.03), noise.between(0.01, 0.08)),
+            1 => {
+                let by_m = 10f64.powf(noise.between(-4.0, -2.3));
+                crumpled(noise, 2, by_m)
+            }
+            _ => make::cuboid([0.0; 3].map(|_| noise.between(0.01, 0.06))),
+        };
+        (part, Rotation3::new(noise.vector(1.0)), noise.vector(0.02))
+    })
+}
+
+fn tube(radius_m: f64, length_m: f64) -> TriangleSoup {
+    make::star(12, radius_m, radius_m, length_m)
 }
 
 /// A few blocks that go deep through each other, as machine parts that nobody joined.
