@@ -7,6 +7,7 @@
 //! ([`seam`]). What reaches beyond a cube around all bounded parts, and the corners of those without an end, is cut off there.
 //! Accuracy: corners lie on the boundary, those of edges within what a chord misses of its arc: with [`FINEST`] steps around,
 //! 0.12 % of the radius. Flat surfaces with straight edges are exact.
+//! Where they are coarser, rings have more steps around and fewer around the tube, so that both miss as much (m).
 //! Frames: object frame B. Cost: bounded by [`MOST_LOOKS`] and [`MOST_TRIANGLES`], where it is too much with coarser steps; a few
 //! milliseconds of a dozen leaves.
 
@@ -47,7 +48,11 @@ impl Csg {
                 return solid.facets(&pieces);
             }
         }
-        solid.facets(&solid.coarse_pieces())
+        let Coarse { pieces, around, looks } = solid.coarse_pieces();
+        // What the coarsest steps leave of both bounds makes finer ones.
+        let finer = if around > COARSEST { solid.pieces_within(around, looks) } else { None };
+        let finer = finer.filter(|finer| triangles(finer) <= MOST_TRIANGLES);
+        solid.facets(&finer.unwrap_or(pieces))
     }
 }
 
@@ -66,6 +71,15 @@ struct Solid {
     sizes_m: Vec<f64>,
     /// Nearer to a patch than this is on it (m).
     on_m: f64,
+}
+
+/// Pieces with the coarsest steps.
+struct Coarse {
+    pieces: Vec<Piece>,
+    /// With so many there would be as much as there may be.
+    around: usize,
+    /// Levels that may still be looked at.
+    looks: usize,
 }
 
 /// Step of an evaluation with a stack.
@@ -146,15 +160,25 @@ impl Solid {
 
     /// Pieces of the boundary with so many steps around what is curved; `None`: it takes too long.
     fn pieces(&self, around: usize) -> Option<Vec<Piece>> {
-        let mut cutter = Cutter::new(self, around, MOST_LOOKS);
+        self.pieces_within(around, MOST_LOOKS)
+    }
+
+    fn pieces_within(&self, around: usize, looks: usize) -> Option<Vec<Piece>> {
+        let mut cutter = Cutter::new(self, around, looks);
         self.cut(&mut cutter, around, |cutter| !cutter.is_short).then(|| self.sewn(cutter.pieces))
     }
 
     /// As far as it does not take too long; from there on pieces are not cut.
-    fn coarse_pieces(&self) -> Vec<Piece> {
+    fn coarse_pieces(&self) -> Coarse {
         let mut cutter = Cutter::new(self, COARSEST, MOST_COARSE_LOOKS);
         self.cut(&mut cutter, COARSEST, |_| true);
-        self.sewn(cutter.pieces)
+        let looks = cutter.looks();
+        let pieces = self.sewn(cutter.pieces);
+        let times = |most: usize, of: usize| most as f64 / of.max(1) as f64;
+        let times = times(looks, MOST_COARSE_LOOKS - looks).min(times(MOST_TRIANGLES, triangles(&pieces)));
+        // Both grow with the square; half as many go from pole to pole.
+        let around = COARSEST as f64 * (SPARE * times).sqrt();
+        Coarse { pieces, around: (around as usize).min(FINEST) & !1, looks }
     }
 
     /// Cuts all faces of all leaves; false: it was told to stop.
@@ -223,6 +247,8 @@ const STEPS_AROUND: [usize; 4] = [FINEST, 40, 24, COARSEST];
 const FINEST: usize = 64;
 /// Fewer make no ball.
 const COARSEST: usize = 12;
+/// Of what there may be, what is asked for: cuts along curves do not grow with the square.
+const SPARE: f64 = 0.95;
 /// Of the extent: half the cube that holds all bounded parts; a cube that is not round numbers meets no face edge-on.
 const REACH: f64 = 1.0173;
 /// Of the extent: nearer surfaces are one (as in [`flatten`](super::flatten)).

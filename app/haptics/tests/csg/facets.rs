@@ -230,3 +230,35 @@ fn a_ring_is_as_thick_as_its_tube() {
     // A chord of the tube misses 0.12 % of its radius.
     assert!((size(&facets).y - 1e-4).abs() < MISSED * 0.02, "{:?}", size(&facets));
 }
+
+/// The largest distance of triangles' corners, middles of edges and middles from the boundary (m), at least.
+fn missed_m(csg: &Csg, facets: &Facets) -> f64 {
+    let at = |corner: u32| facets.places[corner as usize];
+    let places = facets.triangles.iter().flat_map(|triangle| {
+        let [a, b, c] = triangle.map(at);
+        [a, (a + b) / 2.0, (b + c) / 2.0, (c + a) / 2.0, (a + b + c) / 3.0]
+    });
+    places.map(|place| csg.signed_distance(&place).abs()).fold(0.0, f64::max)
+}
+
+/// Two hundred rings, linked and through each other, and fewer: more than is drawn with many steps.
+#[test]
+fn a_crowd_of_rings_is_drawn_as_finely_as_its_triangles_allow() {
+    let (ring_m, tube_m) = (0.026, 0.006);
+    for (count, reach_m, at_most_m) in [(200, 0.1, 1e-3), (100, 0.4, 1e-3)] {
+        let mut noise = Noise(1);
+        let rings = (0..count).map(|_| {
+            let place = Vector3::from_fn(|_, _| noise.between(-1.0, 1.0) * reach_m);
+            let axis = Vector3::from_fn(|_, _| noise.between(-1.0, 1.0)).normalize();
+            CsgPart::new(Torus::new(ring_m, tube_m).unwrap(), trees::along(axis, place))
+        });
+        let csg = built(&CsgTree::union(rings));
+        let begin = std::time::Instant::now();
+        let facets = csg.facets();
+        let took = begin.elapsed();
+        let missed_m = missed_m(&csg, &facets);
+        println!("{count}, {reach_m}: {} triangles, off {missed_m:e} m, {took:?}", facets.triangles.len());
+        // With 12 steps around both, the chords of ring and tube miss 1.3 mm together.
+        assert!(missed_m < at_most_m, "{count}, {reach_m}: {missed_m}");
+    }
+}

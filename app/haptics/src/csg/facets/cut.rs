@@ -94,6 +94,11 @@ impl<'s> Cutter<'s> {
         }
     }
 
+    /// Levels that may still be looked at.
+    pub(super) fn looks(&self) -> usize {
+        self.looks
+    }
+
     /// Cuts pieces of a leaf's patch.
     pub(super) fn leaf_face(&mut self, leaf: usize, patch: u16, pieces: Vec<Polygon>) {
         let before = self.items.len();

@@ -11,6 +11,7 @@ use nalgebra::{Matrix3, Vector3};
 use super::super::curved::Curved;
 use super::super::kind::Kind;
 use super::super::patch::Patch;
+use super::FINEST;
 use super::polygon::Polygon;
 
 /// The part of a surface within a ball, and perhaps more, with so many pieces around an axis.
@@ -39,7 +40,11 @@ fn round(curved: &Curved, centre_B: &Vector3<f64>, radius_m: f64, around: usize)
         let reach = radius_m * turn_LB.row(1).norm();
         [middle - reach, middle + reach]
     });
-    let mut angles: Vec<f64> = (0..around).map(|k| TAU * k as f64 / around as f64).collect();
+    let steps = match curved.kind() {
+        Kind::Ring { ring_radius_m, tube_radius_m } => steps_of_ring(around, ring_radius_m, tube_radius_m)[0],
+        _ => around,
+    };
+    let mut angles: Vec<f64> = (0..steps).map(|k| TAU * k as f64 / steps as f64).collect();
     let across = far_L.iter().filter(|far| far.x.hypot(far.z) > LEAST_ACROSS * far.norm());
     lines_through(&mut angles, across.map(|far| turned(far.z.atan2(far.x))));
     let place = |[rho, y]: [f64; 2], angle: f64| {
@@ -105,7 +110,7 @@ fn rings(kind: Kind, far_L: &[Vector3<f64>], around: usize, ends: impl Fn() -> [
                 .into()
         }
         Kind::Ring { ring_radius_m, tube_radius_m } => {
-            let steps = around;
+            let [_, steps] = steps_of_ring(around, ring_radius_m, tube_radius_m);
             let mut angles: Vec<f64> = (0..steps).map(|k| TAU * k as f64 / steps as f64).collect();
             lines_through(&mut angles, pitches().map(turned));
             let mut rings: Vec<[f64; 2]> = angles
@@ -116,6 +121,17 @@ fn rings(kind: Kind, far_L: &[Vector3<f64>], around: usize, ends: impl Fn() -> [
             rings
         }
     }
+}
+
+/// Steps around a ring and around its tube: as many pieces as with equal numbers, and chords that miss the same of both (m): as
+/// the radius over the square of the number. With the finest steps both miss the same share of their radius.
+fn steps_of_ring(around: usize, ring_radius_m: f64, tube_radius_m: f64) -> [usize; 2] {
+    if around >= FINEST {
+        return [around; 2];
+    }
+    let more = ((ring_radius_m + tube_radius_m) / tube_radius_m).powf(0.25);
+    let of_tube = ((around as f64 / more).ceil() as usize).clamp(LEAST_AROUND_TUBE.min(around), around);
+    [(around * around / of_tube).min(FINEST), of_tube]
 }
 
 /// The same angle within a turn.
@@ -141,6 +157,8 @@ fn lines_through(lines: &mut Vec<f64>, through: impl Iterator<Item = f64>) {
     lines.sort_by(f64::total_cmp);
 }
 
+/// Fewer steps around a tube make an edge of it.
+const LEAST_AROUND_TUBE: usize = 8;
 /// Of a step: nearer lines are moved.
 const NEAR: f64 = 0.1;
 /// Of a direction: along an axis no angle around it is farthest; and poles have no lines beside them.
