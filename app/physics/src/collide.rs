@@ -86,6 +86,8 @@ pub struct ContactPoint {
     pub gap_m: f64,
     /// Which part of its depth counts: less than 1 where it is next to other points.
     pub share: f64,
+    /// Which part of it bears where a mesh is round, so that others bear it when it rolls on.
+    pub rolls: f64,
 }
 
 impl ContactPoint {

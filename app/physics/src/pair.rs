@@ -206,9 +206,12 @@ impl Pair {
         };
         self.carry(&found, poses, deep, speed_m_s * start.dt_s, last);
         let pressed = self.anchors[..self.count].iter().filter(|anchor| anchor.is_pressed()).count();
-        let resists_turning = (1..=turning::MOST_POINTS).contains(&pressed);
-        if !resists_turning {
-            self.anchors[..self.count].iter_mut().for_each(|anchor| anchor.turn_back(0.0));
+        let (surfacing, is_soft) = (self.surfacing, self.memory.is_soft);
+        let turning_m = move |point: &ContactPoint| turning::lengths_m(&surfacing, point, pressed, is_soft);
+        for (anchor, point) in self.anchors.iter_mut().zip(found.as_slice()) {
+            if turning_m(point) == [0.0; 2] {
+                anchor.turn_back(0.0);
+            }
         }
         // A contact that is not found for a tick may still be there: until then the account stays.
         if self.count > 0 {
@@ -221,9 +224,8 @@ impl Pair {
                 continue;
             }
             let (mut row, stop_n_s_per_m) = row(self.bodies, &self.surfacing, anchor, point, &b.X_WB, start);
-            if resists_turning {
-                turning::resist(&mut row, &self.surfacing, &anchor.turned_W(&b.X_WB), start);
-            }
+            let k = surfacing.stiffness_n_per_m;
+            turning::resist(&mut row, turning_m(point), k, &anchor.turned_W(&b.X_WB), start);
             let response = self.surfacing.response;
             if let Some(restitution) = response.restitution() {
                 let stop = Stop { n_s_per_m: stop_n_s_per_m, is_always: !response.has_springs() };

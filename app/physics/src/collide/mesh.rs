@@ -129,6 +129,8 @@ pub(super) struct Contact {
     pub(super) gap_m: f64,
     /// Which part of its depth that is.
     pub(super) share: f64,
+    /// Which part of it bears where the surface is round.
+    pub(super) rolls: f64,
     /// It was one of its place's in the last tick.
     pub(super) carried: bool,
 }
@@ -143,19 +145,26 @@ impl Contact {
             normal_M,
             gap_m,
             share: 1.0,
+            rolls: 0.0,
             carried: false,
         }
+    }
+
+    /// The same; where it presses, what it stands on may be round there.
+    pub(super) fn rolling(self, is_round: impl FnOnce() -> bool) -> Self {
+        Self { rolls: if self.gap_m < 0.0 && is_round() { 1.0 } else { 0.0 }, ..self }
     }
 }
 
 impl Told<'_> {
     pub(super) fn tell(&mut self, contact: &Contact) {
-        let Contact { id, on_mesh_M, on_other_M, normal_M, gap_m, share, .. } = *contact;
+        let Contact { id, on_mesh_M, on_other_M, normal_M, gap_m, share, rolls, .. } = *contact;
         let (point_M, sign) = if self.mesh_is_a { (on_mesh_M, -1.0) } else { (on_other_M, 1.0) };
         let point_W = (self.X_WM * Point3::from(point_M)).coords;
         let (gap_m, share) =
             if gap_m < 0.0 { (gap_m * self.part, share * self.part) } else { (gap_m, share) };
-        self.found.push(ContactPoint { id, point_W, normal_W: self.X_WM * normal_M * sign, gap_m, share });
+        let normal_W = self.X_WM * normal_M * sign;
+        self.found.push(ContactPoint { id, point_W, normal_W, gap_m, share, rolls });
     }
 }
 

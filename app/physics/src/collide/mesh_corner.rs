@@ -2,6 +2,7 @@
 
 use haptics::mesh::{Face, Mesh, Sides};
 use nalgebra::Vector3;
+use std::f64::consts::FRAC_1_SQRT_2;
 
 /// Three times the face's number plus that of the corner.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -95,6 +96,24 @@ impl Corner {
             let toward = mesh.faces()[face as usize].normal_B.dot(way_M);
             toward > LOOKS || mesh.sides() == Sides::Sheet && toward < -LOOKS
         })
+    }
+
+    /// Whether several faces around it look about that way, and not all alike: on what is round others bear when it rolls.
+    pub(super) fn is_round(self, mesh: &Mesh, way_M: &Vector3<f64>) -> bool {
+        let is_sheet = mesh.sides() == Sides::Sheet;
+        let mut fan = Fan::new(mesh, self.0 / 3, (self.0 % 3) as usize);
+        let mut first = None;
+        while let Some((face, _)) = fan.next() {
+            let normal_M = mesh.faces()[face as usize].normal_B;
+            let toward = normal_M.dot(way_M);
+            if (if is_sheet { toward.abs() } else { toward }) < LOOKS_ALONG {
+                continue;
+            }
+            if (normal_M - *first.get_or_insert(normal_M)).norm_squared() > FLAT * FLAT {
+                return true;
+            }
+        }
+        false
     }
 
     /// Visits the ends of all edges that leave it and are sharp, or long and bent at all, each with its face and number there:
@@ -208,6 +227,8 @@ fn bends(mesh: &Mesh, face: &Face, corner: usize) -> bool {
 const FLAT: f64 = 1e-6;
 /// Cosine to the normal of a face that looks there.
 const LOOKS: f64 = 0.2;
+/// Cosine to the normal of a face that looks about there: half way between two sides of a box.
+const LOOKS_ALONG: f64 = FRAC_1_SQRT_2;
 /// Cosine between the faces of a sharp edge.
 const SHARP: f64 = 0.9;
 /// Cosine of a turn from one edge to the next that is none.

@@ -200,6 +200,16 @@ impl Other<'_> {
         }
     }
 
+    /// Whether a vertex of its own [is round](Corner::is_round) in this direction.
+    pub(super) fn is_round(&self, own: &Own, way_M: &Vector3<f64>) -> bool {
+        match (self.solid, own.corner) {
+            (Solidity::Mesh(mesh), Some(corner)) => {
+                corner.is_round(mesh, &self.X_MO.inverse_transform_vector(way_M))
+            }
+            _ => false,
+        }
+    }
+
     /// The point of an ellipsoid that lies farthest against a direction: the only one of its own.
     pub(super) fn lowest(&self, up_M: &Vector3<f64>) -> Option<Vector3<f64>> {
         let Solidity::Form(form) = self.solid else { return None };

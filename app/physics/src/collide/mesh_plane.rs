@@ -56,7 +56,8 @@ pub(super) fn contact_points(
     let find = |lows: &mut Lows| {
         let see = |corner: Corner| {
             let about = About::Vertex(corner.vertex(mesh));
-            Some(Contact::new(about, *corner.point_M(mesh), -normal_M, standing.height_m(corner)))
+            let contact = Contact::new(about, *corner.point_M(mesh), -normal_M, standing.height_m(corner));
+            Some(contact.rolling(|| corner.is_round(mesh, &-normal_M)))
         };
         lows.find(&standing, |_| true, see)
     };

@@ -249,7 +249,8 @@ impl Place<'_> {
         let seen = self.of_vertex(&on_mesh_M)?;
         let looks = !self.patches.are_several() || corner.looks(mesh, &-seen.out);
         let about = About::Vertex(corner.vertex(mesh));
-        looks.then(|| Contact::new(about, on_mesh_M, -seen.out, seen.gap_m))
+        let is_round = || corner.is_round(mesh, &-seen.out);
+        looks.then(|| Contact::new(about, on_mesh_M, -seen.out, seen.gap_m).rolling(is_round))
     }
 
     /// Of one place among several, what lies behind it does not count; but what lies beside it does, where that is the end
@@ -352,7 +353,8 @@ impl Place<'_> {
         let looks = !self.patches.are_several() || other.looks(own, &-seen.out);
         let on_mesh_M = own.at_M - seen.out * seen.gap_m;
         let about = About::Other(own.number);
-        looks.then(|| Contact::new(about, on_mesh_M, seen.out, seen.gap_m - own.radius_m))
+        let is_round = || other.is_round(own, &-seen.out);
+        looks.then(|| Contact::new(about, on_mesh_M, seen.out, seen.gap_m - own.radius_m).rolling(is_round))
     }
 
     /// Where edges of a form are cut off by the mesh.

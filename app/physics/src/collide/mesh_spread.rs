@@ -195,11 +195,12 @@ impl Lows {
     /// The contact point of a group: where nothing of it touches, the lowest.
     fn contact(&self, group: usize) -> Contact {
         let own = || self.all[..self.count].iter().filter(|low| low.group == group).map(|low| &low.contact);
-        let (mut deep_m, mut deep_m2) = (0.0, 0.0);
+        let (mut deep_m, mut deep_m2, mut rolls_m) = (0.0, 0.0, 0.0);
         let (mut at_M, mut normal_M) = (Vector3::zeros(), Vector3::zeros());
         for low in own().filter(|low| low.gap_m < 0.0) {
             deep_m -= low.gap_m;
             deep_m2 += low.gap_m * low.gap_m;
+            rolls_m -= low.gap_m * low.rolls;
             at_M -= low.on_mesh_M * low.gap_m;
             normal_M -= low.normal_M * low.gap_m;
         }
@@ -214,7 +215,8 @@ impl Lows {
         let (on_mesh_M, normal_M) = (at_M / deep_m, normal_M / force_m);
         let on_other_M = on_mesh_M - normal_M * (deep_m2 / force_m);
         let share = force_m * force_m / deep_m2;
-        Contact { id, on_mesh_M, on_other_M, normal_M, gap_m: -force_m, share, carried: false }
+        let rolls = rolls_m / deep_m;
+        Contact { id, on_mesh_M, on_other_M, normal_M, gap_m: -force_m, share, rolls, carried: false }
     }
 }
 
@@ -236,4 +238,4 @@ const LEAST_FORCE: f64 = 0.1;
 const MOST_LOOKS: usize = 2 * MOST_VERTICES;
 /// Bound on the nodes of the hierarchy and the runs of faces that are looked at. With four times as many, cans of thousands of sides
 /// stand, and balls of a hundred thousand triangles sway on their facets for longer than half a minute.
-const MOST_VISITS: usize = 2048;
+const MOST_VISITS: usize = 8192;

@@ -135,6 +135,7 @@ impl Spots {
                 normal_W: X_W.rotation * normal,
                 gap_m: if spot.gap_m < 0.0 { -depth_m } else { spot.gap_m },
                 share: if spot.gap_m < 0.0 { depth_m / -spot.gap_m } else { share },
+                rolls: 0.0,
             });
         }
     }

@@ -7,8 +7,9 @@
 //! along. The normal force is that of the same tick, as along the surface: with that of the last one,
 //! points that press in every other tick turned each other while they did not touch, and light bodies
 //! between heavy ones hopped on for ever.
-//! Limits: three points and more of two entities resist turning by friction and springs, and this is left to them; and of
-//! integrators that take forces of the beginning of a tick there is none.
+//! Three points and more of two entities resist turning by friction and springs, and this is left to them; but not rolling where
+//! a mesh presses softly with what is round, be it by a hundred vertices: those behind let go as others come down.
+//! Limits: of integrators that take forces of the beginning of a tick there is none.
 //! Frames: an angle, times [`PATCH_M`], is kept in the other's frame ([`Anchor`]).
 //! Invariant: what the springs hold is in the pair's account ([`super::ledger`]).
 
@@ -16,17 +17,38 @@ use nalgebra::{Isometry3, Vector3};
 
 use super::{Start, Surfacing};
 use crate::anchor::Anchor;
+use crate::collide::ContactPoint;
 use crate::row::{Rolling, Row, Torsion, within_ball};
 
 /// Points of two entities, of which each resists turning; more do so together.
-pub(super) const MOST_POINTS: usize = 2;
+const MOST_POINTS: usize = 2;
 /// Radius of the patch \[m\]: of a fingertip's size, below that of what is held.
 const PATCH_M: f64 = 3e-3;
 
-/// Gives a row its resistance to turning; `turned_W` is how far the body has been turned at the rim (m).
-pub(super) fn resist(row: &mut Row, surfacing: &Surfacing, turned_W: &Vector3<f64>, start: &Start<'_>) {
+/// Lengths of the torsional and rolling friction that a point has, one of so many that are pressed \[m\].
+pub(super) fn lengths_m(
+    surfacing: &Surfacing,
+    point: &ContactPoint,
+    pressed: usize,
+    is_soft: bool,
+) -> [f64; 2] {
     let [torsional_m, rolling_m] = surfacing.turning_m;
-    if torsional_m.max(rolling_m) == 0.0 || !start.is_implicit {
+    match pressed {
+        1..=MOST_POINTS => [torsional_m, rolling_m],
+        _ if is_soft => [0.0, rolling_m * point.rolls],
+        _ => [0.0; 2],
+    }
+}
+
+/// Gives a row these lengths of resistance to turning (m); `turned_W` is how far the body has been turned at the rim (m).
+pub(super) fn resist(
+    row: &mut Row,
+    turning_m: [f64; 2],
+    stiffness_n_per_m: f64,
+    turned_W: &Vector3<f64>,
+    start: &Start<'_>,
+) {
+    if turning_m == [0.0; 2] || !start.is_implicit {
         return;
     }
     // In the mean of all axes.
@@ -35,11 +57,11 @@ pub(super) fn resist(row: &mut Row, surfacing: &Surfacing, turned_W: &Vector3<f6
     if turns_per_kg_m2 <= 0.0 {
         return;
     }
-    let stiffness_nm_per_rad = surfacing.stiffness_n_per_m * PATCH_M * PATCH_M;
+    let stiffness_nm_per_rad = stiffness_n_per_m * PATCH_M * PATCH_M;
     let damping_nm_s_per_rad = 2.0 * (stiffness_nm_per_rad / turns_per_kg_m2).sqrt();
     let rest_W = turned_W * (-stiffness_nm_per_rad / PATCH_M);
     let rest_nm = row.normal_W.dot(&rest_W);
-    row.turning_m = surfacing.turning_m;
+    row.turning_m = turning_m;
     row.torsion =
         Torsion { rest_nm, stiffness_nm_per_rad, damping_nm_s_per_rad, most_nm: 0.0, torque_nm: rest_nm };
     let rest_W = rest_W - row.normal_W * rest_nm;
