@@ -48,6 +48,9 @@ pub(crate) struct Searched {
     pub(super) within_m: f64,
     /// There may be more, all around.
     pub(super) is_crowded: bool,
+    /// Ticks that it has gone on for, and how many faces it has tried in them; 0: it is over.
+    pub(super) ticks: u8,
+    pub(super) tried: u16,
 }
 
 impl Patch {

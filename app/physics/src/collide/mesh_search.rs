@@ -6,8 +6,9 @@
 //! that lie far from the planes of places that are known. From each, going to and fro between face and the other one finds
 //! the nearest points of both. Of places with the same normal and plane one is enough: it finds its points itself.
 //! A search finds more than touches, so it is right until the two have moved that much: at rest there is none.
-//! Error: after [`MOST_VISITS`] nodes and [`MOST_TRIED`] faces it ends, farthest from known planes first; and a wall that
-//! rises less than [`BAND_M`] over a known plane is not seen.
+//! In a tick it tries [`MOST_TRIED`] faces, farthest from known planes first, and goes on with the next ones in the ticks that follow:
+//! with the same ones again, the other end of a bar of many sides that lay across a hollow was not found before it was deep.
+//! Error: after [`MOST_TICKS`] more ticks it ends; and a wall that rises less than [`BAND_M`] over a known plane is not seen.
 //! Frames: the mesh's frame M.
 
 use haptics::Feature;
@@ -26,20 +27,27 @@ pub(super) fn look_around(
     travel_m: f64,
     patches: &mut Patches,
 ) {
-    let is_known = |searched: &Searched| has_moved_m(searched, mesh, other) + reach_m <= searched.within_m;
+    let is_known = |searched: &Searched| {
+        searched.ticks == 0 && has_moved_m(searched, mesh, other) + reach_m <= searched.within_m
+    };
     if patches.searched.as_ref().is_some_and(is_known) {
         return;
     }
     let within_m = reach_m + MARGIN_M + 4.0 * travel_m;
-    patches.searched = Some(Searched { X_MO: other.X_MO, within_m, is_crowded: false });
-    let mut places = Places::new(within_m, patches);
+    let begins = Searched { X_MO: other.X_MO, within_m, is_crowded: false, ticks: 0, tried: 0 };
+    let mut searched = patches.searched.filter(|searched| searched.ticks > 0).unwrap_or(begins);
+    let mut places = Places::new(within_m, patches, &searched);
     let (_, radius_m) = other.ball();
     let is_convex = other.is_convex();
     let is_complete = mesh.for_each_face_in_boxes(
         &mut places,
         |places, middle_M, half_M| places.key(other, middle_M, half_M),
         |places, face| {
-            if !places.knows(mesh, face) {
+            if places.knows(mesh, face) {
+                return true;
+            }
+            places.met = places.met.saturating_add(1);
+            if places.met > searched.tried {
                 places.tried += 1;
                 let place = nearest_to(mesh, face, other, radius_m, within_m);
                 let is_new = |place: &Place| places.is_better(place, is_convex) && place.is_nearest(mesh);
@@ -49,13 +57,18 @@ pub(super) fn look_around(
             }
             places.tried < MOST_TRIED
         },
-        MOST_VISITS,
+        MOST_VISITS * (1 + usize::from(searched.ticks)),
     );
-    if places.is_crowded || !is_complete {
+    searched.is_crowded |= places.is_crowded || !is_complete;
+    if !is_complete && !places.is_crowded && searched.ticks < MOST_TICKS && places.tried > 0 {
+        (searched.ticks, searched.tried) = (searched.ticks + 1, searched.tried + places.tried);
+    } else if is_complete && !places.is_crowded {
+        (searched.ticks, searched.tried) = (0, 0);
+    } else {
         let margin_m = if places.is_crowded { CROWDED_M } else { 0.5 * MARGIN_M };
-        patches.searched =
-            Some(Searched { X_MO: other.X_MO, within_m: reach_m + margin_m, is_crowded: true });
+        searched = Searched { within_m: reach_m + margin_m, is_crowded: true, ..begins };
     }
+    patches.searched = Some(searched);
     places.settle(patches, is_convex);
 }
 
@@ -107,24 +120,27 @@ struct Places {
     within_m: f64,
     /// So deep is the deepest of those that press \[m\].
     deepest_m: f64,
-    tried: usize,
+    /// Faces that were met in this search in no plane of a known place, and those of them that were tried.
+    met: u16,
+    tried: u16,
     /// There are more than it has room for.
     is_crowded: bool,
 }
 
 impl Places {
-    /// Those that are pressed, and the first one.
-    fn new(within_m: f64, patches: &Patches) -> Self {
+    /// Those that are pressed, and the first one; of a search that goes on, all that it has found.
+    fn new(within_m: f64, patches: &Patches, searched: &Searched) -> Self {
         let mut places = Self {
             all: [Place::default(); MAX_PATCHES],
             count: 0,
             within_m,
             deepest_m: 0.0,
+            met: 0,
             tried: 0,
             is_crowded: false,
         };
         for (number, patch) in patches.all.iter().enumerate() {
-            if number == 0 || patch.is_pressed() {
+            if number == 0 || patch.is_pressed() || searched.ticks > 0 && patch.is_known {
                 let Patch { normal_M, at_M, depth_m, .. } = *patch;
                 places.all[places.count] =
                     Place { normal_M, at_M, gap_m: -depth_m, is_edge: false, number: Some(number) };
@@ -278,7 +294,9 @@ const ROUNDING: f64 = 1e-6;
 const LITTLE: f64 = 1e-2;
 /// Turns between a face and the other one.
 const TO_AND_FRO: usize = 3;
-/// Nodes and runs of the hierarchy that are looked at.
+/// Nodes and runs of the hierarchy that are looked at, in the first tick; in those that follow as many more.
 const MOST_VISITS: usize = 192;
-/// Faces from which it is gone to and fro.
-const MOST_TRIED: usize = 128;
+/// Faces from which it is gone to and fro in a tick.
+const MOST_TRIED: u16 = 128;
+/// Ticks in which a search goes on.
+const MOST_TICKS: u8 = 8;
