@@ -9,7 +9,8 @@
 //! Of more than [`MOST_VERTICES`] within reach only every second one counts, or every fourth, and so on: of each its number
 //! says whether it does, wherever the mesh stands.
 //! Identity: a chosen one stays chosen while it is within reach; how many count changes only where they are too many or few.
-//! Cost: a query, and a distance for each vertex and chosen one: up to some tens of microseconds. Where there are more than it has
+//! Cost: a query, and a distance for each vertex and chosen one: tens of microseconds, of thousands of vertices up to
+//! some hundreds. Where there are more than it has
 //! room for, they are looked at again after a while.
 
 use nalgebra::Vector3;
@@ -236,6 +237,7 @@ const SCATTER: u32 = 2_654_435_769;
 const LEAST_FORCE: f64 = 0.1;
 /// Vertices that are looked at, whether they are within reach or not.
 const MOST_LOOKS: usize = 2 * MOST_VERTICES;
-/// Bound on the nodes of the hierarchy and the runs of faces that are looked at. With four times as many, cans of thousands of sides
-/// stand, and balls of a hundred thousand triangles sway on their facets for longer than half a minute.
+/// Bound on the nodes of the hierarchy and the runs of faces that are looked at. With a fourth, few stood for all of a can of a thousand
+/// sides, and it rocked. Balls of a hundred thousand triangles without rolling friction sway for longer
+/// than with a fourth.
 const MOST_VISITS: usize = 8192;

@@ -316,12 +316,17 @@ fn stacks_that_begin_at_rest_as_felt_stay_where_they_are() {
 
 /// Upright along z.
 fn can(sides: u32) -> Arc<Mesh> {
+    can_of(sides, |_| true)
+}
+
+/// With those of the corners that are left in.
+fn can_of(sides: u32, is_left: impl Fn(u32) -> bool) -> Arc<Mesh> {
     let corner = |side: u32| {
         let angle = TAU * f64::from(side) / f64::from(sides);
         [0.03 * angle.cos(), 0.03 * angle.sin()]
     };
-    let outline: Vec<[f64; 2]> = (0..sides).map(corner).collect();
-    let triangles: Vec<[u32; 3]> = (1..sides - 1).map(|side| [0, side, side + 1]).collect();
+    let outline: Vec<[f64; 2]> = (0..sides).filter(|side| is_left(*side)).map(corner).collect();
+    let triangles: Vec<[u32; 3]> = (1..outline.len() as u32 - 1).map(|side| [0, side, side + 1]).collect();
     meshes::build(meshes::prism(&outline, &triangles, 0.08))
 }
 
@@ -500,6 +505,54 @@ fn balls_of_triangles_as_felt_roll_as_far_on_cylinders_and_meshes() {
         // On a fine sheet it is braked by a tenth: where more than one place is known, few vertices stand for all for a while.
         assert!((found_m / expected_m - 1.0).abs() < 0.12, "{name}: {found_m} of {expected_m}");
     }
+}
+
+/// Limits that docs/contacts.md tells, as large as it tells them: degrees and rad/s after so many seconds.
+#[test]
+fn where_meshes_as_felt_lean_and_sway_they_do_by_no_more_than_is_told() {
+    let settings = settings(ContactStiffness::AsFelt);
+    let up = UnitQuaternion::from_axis_angle(&Vector3::x_axis(), -FRAC_PI_2);
+    let across = UnitQuaternion::from_axis_angle(&Vector3::y_axis(), FRAC_PI_2);
+    let plane = floor(0.0, 1000.0, 0.5);
+    let bowl = meshes::build(meshes::block(64, 0.6, 0.1, |x, z| 2.0 * (x * x + z * z)));
+    let bowl = object(bowl, Isometry3::identity(), 1000.0, 0.5);
+    let lies = UnitQuaternion::from_axis_angle(&Vector3::x_axis(), FRAC_PI_2);
+    let pipe = Isometry3::from_parts(Vector3::new(0.0, -0.05, 0.0).into(), lies);
+    let pipe = object(Cylinder::new(0.05, 1.0).unwrap(), pipe, 1000.0, 0.5);
+    // Half of its rim has a fifth of the corners of the other half.
+    let uneven = can_of(80, |side| side < 40 || side % 5 == 0);
+    let cases = [
+        ("uneven rim", plane.clone(), uneven, up, 1, 2.0, 0.35, 1e-3),
+        ("in a bowl", bowl, can(48), up, 1, 3.0, 1.5, 3.0),
+        ("48 across a pipe", pipe.clone(), can(48), across, 1, 2.0, 1e-3, 1e-3),
+        ("8 across a pipe", pipe, can(8), across, 1, 2.0, 1e-3, 1e-3),
+        ("three on each other", plane, can(48), up, 3, 2.0, 0.1, 0.1),
+    ];
+    let mut found = Vec::new();
+    for (name, support, mesh, turn, count, seconds, leans_most, turns_most) in cases {
+        // A stack is slow to compute.
+        for rate_hz in [1000.0, 4000.0].into_iter().take(if count > 1 { 1 } else { 2 }) {
+            let half_m = if turn == up { 0.04 } else { 0.03 };
+            let thing = |place: u32| {
+                let middle_m = half_m + 0.002 + (2.0 * half_m + 0.0005) * f64::from(place);
+                let at = Isometry3::from_parts(Vector3::new(0.0, middle_m, 0.0).into(), turn);
+                let thing = object(mesh.clone(), at, 1000.0, 0.5);
+                (thing.with_turning_friction(2e-4, 2e-4).unwrap(), 0.3)
+            };
+            let mut table = Table::new((0..count).map(thing).collect(), settings, rate_hz);
+            table.entities[0] = support.clone();
+            table.run(seconds);
+            let axis_W = turn * Vector3::z();
+            let lean = |entity: &Entity| (entity.X_WB.rotation * Vector3::z()).angle(&axis_W).to_degrees();
+            let leans = table.entities[1..].iter().map(lean).fold(0.0, f64::max);
+            let spins = table.manipulation.bodies().iter().map(|body| body.angular_velocity_W().norm());
+            found.push((name, rate_hz, leans, leans_most, spins.fold(0.0, f64::max), turns_most));
+        }
+    }
+    let is_told = |(_, _, leans, leans_most, turns, turns_most): &(_, _, f64, f64, f64, f64)| {
+        leans < leans_most && turns < turns_most
+    };
+    assert!(found.iter().all(is_told), "{found:#?}");
 }
 
 /// One that lies in a hollow touches with both ends. Where a search tried the same of its many faces in each tick, the other end was
