@@ -225,7 +225,7 @@ impl Slot {
         }
     }
 
-    /// The contact goes on with no more than this force (N), and what finger and entity move.
+    /// The contact goes on with no more than this force (N).
     pub(crate) fn shorten(&mut self, most_n: f64) {
         if let Some(contact) = &self.contact {
             self.onset.shorten(most_n / contact.stiffness_n_per_m);

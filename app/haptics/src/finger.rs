@@ -251,8 +251,8 @@ impl Finger {
         self.slots.vacate(entity);
     }
 
-    /// The contact with one entity goes on with no more than this force (N, >= 0), and grows with what finger and entity move, until
-    /// the god-object is as near as that: what it was behind by is forgotten.
+    /// The contact with one entity goes on with no more than this force (N, >= 0): what its spring is longer by is forgotten until the
+    /// finger is out, as of what gave way for good. The force grows from there with what finger and entity move.
     pub fn shorten(&mut self, entity: usize, most_n: f64) {
         if let Some(slot) = self.slots.of_mut(entity) {
             slot.shorten(most_n.max(0.0));

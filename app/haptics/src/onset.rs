@@ -11,6 +11,9 @@
 //! follows: it is never farther from the HIP than a tick ago, but for what the HIP has moved. A tick in which it is brings the
 //! bound back, and is told.
 //!
+//! Somebody may have a contact go on with a shorter spring ([`Onset::shorten`]): what it was longer by is forgotten until the finger
+//! is out, as of what gave way for good.
+//!
 //! A god-object that did not come to rest within its tick's work, or that flies from one part to the next, bears less than
 //! its spring. Where it comes to rest all of the spring would be back at once, after a tick without any: the force grows by
 //! no more than the hand's way, the damper and the ramp.
@@ -32,6 +35,8 @@ pub(crate) struct Onset {
     lag_m: f64,
     /// The part of that which it bore, before the ramp (m).
     spring_m: f64,
+    /// The same without any bound (m).
+    whole_m: f64,
     /// Whether it is farther away than it can have been left behind.
     leapt: bool,
     /// What was cut for it (N).
@@ -51,6 +56,8 @@ enum Longest {
     Bound(f64),
     /// In metres; grows with the ramp until it is all that there is.
     Growing(f64),
+    /// All but this, which is forgotten (m).
+    Without(f64),
 }
 
 impl Onset {
@@ -61,6 +68,7 @@ impl Onset {
         share: 1.0,
         lag_m: 0.0,
         spring_m: 0.0,
+        whole_m: 0.0,
         leapt: false,
         missing_n: 0.0,
         came_on_n: 0.0,
@@ -74,11 +82,11 @@ impl Onset {
         *self = Self { lag_m: self.lag_m, spring_m: self.spring_m, ..Self::AT_ONCE };
     }
 
-    /// The spring is no longer than this from the next tick on (m), and then grows with what moves, as that of a contact that begins
-    /// inside.
+    /// The spring goes on from this length (m), if it was longer: what it was longer by is forgotten, and gives nothing back as the
+    /// finger comes out.
     pub(crate) fn shorten(&mut self, spring_m: f64) {
-        if spring_m < self.spring_m {
-            (self.longest, self.spring_m) = (Longest::Bound(spring_m), spring_m);
+        if spring_m < self.whole_m * self.share && self.strength > 0.0 {
+            self.longest = Longest::Without((self.whole_m - spring_m / self.strength).max(0.0));
         }
     }
 
@@ -116,8 +124,10 @@ impl Onset {
         } else if spring_m > self.spring_m + moved_m + SLACK_M && matches!(self.longest, Longest::Any) {
             self.grow_if_it_fell_behind(spring_m, moved_m, input);
         }
-        self.lag_m = lag_m;
-        self.spring_m = spring_m;
+        if let Longest::Without(forgotten_m) = &mut self.longest {
+            *forgotten_m += (spring_m - self.whole_m - moved_m - SLACK_M).max(0.0);
+        }
+        (self.lag_m, self.spring_m, self.whole_m) = (lag_m, spring_m, spring_m);
         self.came_on_n = 0.0;
         if self.strength >= 1.0 && matches!(self.longest, Longest::Any) {
             1.0
@@ -155,6 +165,7 @@ impl Onset {
     fn bounded(&mut self, spring_m: f64, input: &TouchInput<'_>, step: f64) -> f64 {
         let bound_m = match self.longest {
             Longest::Any => return 1.0,
+            Longest::Without(forgotten_m) => return self.without(forgotten_m, spring_m),
             Longest::Overlap => input.overlap_m(),
             Longest::Bound(bound_m) => bound_m + input.way_m(),
             Longest::Growing(bound_m) if step > 0.0 => bound_m + input.way_m() + step * spring_m,
@@ -172,6 +183,14 @@ impl Onset {
         };
         self.spring_m = spring_m.min(bound_m);
         (bound_m / spring_m).min(1.0)
+    }
+
+    /// The part of the force that is left without what is forgotten; that is never more than there is.
+    fn without(&mut self, forgotten_m: f64, spring_m: f64) -> f64 {
+        let forgotten_m = forgotten_m.min(spring_m);
+        self.longest = if forgotten_m > 0.0 { Longest::Without(forgotten_m) } else { Longest::Any };
+        self.spring_m = spring_m - forgotten_m;
+        if forgotten_m > 0.0 { self.spring_m / spring_m } else { 1.0 }
     }
 }
 

@@ -72,6 +72,7 @@ pub use manipulation::{
 pub use mass::MassProperties;
 pub use pair::{Response, Surfacing};
 pub use pair_friction::PairFriction;
+pub use pairs::MOST_PAIRS;
 pub use pull::{MAX_PULLS, Pull};
 pub use roster::Standing;
 pub use row::{Held, Rolling, Row, Torsion};

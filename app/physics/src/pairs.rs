@@ -21,6 +21,9 @@ use crate::collide::bounding_ball;
 use crate::contacts::Contacts;
 use crate::pair::{self, Head, Pair, REACH_M, Surfacing};
 
+/// The most pairs that there can be, two million: others are left out, and counted.
+pub const MOST_PAIRS: usize = pool::MOST;
+
 /// Pairs, and which bodies and entities they are of.
 #[derive(Debug, Clone)]
 pub(crate) struct Pairs {

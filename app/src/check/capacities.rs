@@ -14,6 +14,7 @@ use crate::pace::Pace;
 use crate::rig::Rig;
 use crate::row::Row;
 use bytemuck::Zeroable;
+use physics::MOST_PAIRS;
 use recorded::most_bytes_a_row;
 use serde_json::{Value, json};
 use shm_abi::frame::DEVICE_POSITION_VALID;
@@ -105,8 +106,14 @@ impl Capacities {
         let mut lines = Vec::new();
         let period_us = in_us(self.period_ns as f64);
         if self.moving > 0 {
+            // Of many things at one place there are half the square.
+            let others = if self.pairs >= MOST_PAIRS {
+                ", the most that there can be: others are LEFT OUT"
+            } else {
+                ""
+            };
             lines.push(format!(
-                "pairs near each other: {} at the start; room for {} in the fast list, until more is made",
+                "pairs near each other: {} at the start{others}; room for {} in the fast list, until more is made",
                 self.pairs, self.pair_room
             ));
         }
