@@ -62,7 +62,7 @@ fn a_contact_that_is_shortened_goes_on_from_there_and_gives_back_what_it_took_fr
     for (entity, top) in below() {
         for radius in [0.0, 2e-3] {
             let mut finger = Finger::new(radius, 1).unwrap();
-            let mut force_at = |finger: &mut Finger, depth: f64| {
+            let force_at = |finger: &mut Finger, depth: f64| {
                 let hip = Vector3::new(0.0, top + radius - depth, 0.0);
                 finger.step(std::slice::from_ref(&entity), &hip, DT).force_on_user_W.y
             };
