@@ -89,10 +89,10 @@ fn environments_are_planes_meshes_and_mixtures_too() {
 #[test]
 fn what_is_seen_need_not_be_what_is_felt() {
     let visuals = |keys: &str| parsed(&ball(keys)).entities.remove(0).visuals;
-    assert_eq!(visuals(""), [VisualSpec::default()]);
+    assert_eq!(*visuals(""), [VisualSpec::default()]);
     assert!(visuals("visual = false").is_empty());
     let red = VisualSpec { colour: Some([0.7, 0.0, 0.0, 1.0]), ..VisualSpec::default() };
-    assert_eq!(visuals("visual = { colour = [0.7, 0.0, 0.0] }"), [red]);
+    assert_eq!(*visuals("visual = { colour = [0.7, 0.0, 0.0] }"), [red]);
     let several = visuals(
         "visual = [{ shape = { kind = \"mesh\", file = \"fine.obj\" }, colour = [1, 1, 1, 0.25] }, \
          { position_m = [0, 0.1, 0], casts_shadow = false }]",
