@@ -18,6 +18,8 @@ pub const MOST_ACCELERATION_M_S2: f64 = 5.0;
 /// How much the share of its speed with which it goes changes at most per time, where something has to come first \[1/s\]: from its
 /// largest speed that is the largest acceleration, and it stands within the way for which it looks ahead.
 pub(super) const MOST_PACE_PER_S: f64 = MOST_ACCELERATION_M_S2 / MOST_SPEED_M_S;
+/// After so long a wait others that are moved at the time do not wait for it \[s\]: a thing that has left the world never comes.
+const LONGEST_WAIT_S: f64 = 2.0;
 /// Of what has no end, points so far from its frame's origin count \[m\].
 const ENDLESS_M: f64 = 1.0;
 
@@ -29,6 +31,8 @@ pub(super) struct Path {
     stage: Stage,
     /// What was [found](Self::look) in this tick.
     hold: Hold,
+    /// For how long something has been on its way to here (s).
+    waited_s: f64,
     /// Of a body: it had been parked, and is put where it is to be at once. From out of the world the way is long.
     was_parked: bool,
     /// Where it goes then: the newest order that came meanwhile.
@@ -86,6 +90,7 @@ impl Path {
             wanted: *wanted,
             stage: Stage::Waits,
             hold: Hold::Coming,
+            waited_s: 0.0,
             was_parked: false,
             then: None,
         }
@@ -101,12 +106,18 @@ impl Path {
             // It is where it is to be, and comes near nothing.
             Stage::Rests { .. } | Stage::Ends => Hold::Ready,
         };
+        self.waited_s = if self.hold == Hold::Coming { self.waited_s + dt_s } else { 0.0 };
         let is_clear = match self.hold {
             Hold::Ready => true,
-            Hold::Coming => false,
+            Hold::Coming => self.is_left_alone(),
             Hold::TooMuch => !goes,
         };
         (is_clear, if goes { step.pace_of_driven(self.entity) } else { 1.0 })
+    }
+
+    /// Others do not wait for it any more: what it waits for may never come.
+    fn is_left_alone(&self) -> bool {
+        self.waited_s > LONGEST_WAIT_S
     }
 
     /// Goes on by so much time (s), none while something that is here has to have its turn first. None sets out before all of those
@@ -127,7 +138,8 @@ impl Path {
                 self.stage = Stage::Ends;
                 Next::Stopped
             }
-            Stage::Waits if !is_clear => Next::GoesOn,
+            Stage::Waits if !is_clear || self.hold == Hold::Coming => Next::GoesOn,
+            Stage::Goes { .. } if self.is_left_alone() => Next::GoesOn,
             Stage::Goes { .. } if dt_s == 0.0 => Next::GoesOn,
             Stage::Waits if becomes_other && !is_silent => Next::NeedsSilence,
             Stage::Waits => {

@@ -83,7 +83,7 @@ impl FastStep {
     }
 
     /// How fast this entity may go, as a share of how fast it would: less than 1 near what waits for its turn.
-    pub fn pace_of_driven(&self, entity: usize) -> f64 {
+    pub fn pace_of_driven(&mut self, entity: usize) -> f64 {
         self.objects.manipulation.pace_of_driven(entity)
     }
 

@@ -553,6 +553,24 @@ fn what_is_moved_at_the_same_time_waits_together_and_stays_together() {
     assert_eq!((ways.last(), undone), (Some(&[0.0; 2]), 0));
 }
 
+#[test]
+fn what_waits_for_a_thing_that_never_comes_does_not_keep_others_waiting_for_ever() {
+    let plate = |name: &str, x: f64| {
+        let shape = "shape = { kind = \"box\", size_m = [0.1, 0.01, 0.1] }";
+        format!("[[entity]]\nname = \"{name}\"\n{shape}\nposition_m = [{x}, 0.0, 0.0]\n")
+    };
+    // It has left the world: the slow list keeps it where it is, for good.
+    let gone = "[[entity]]\nname = \"gone\"\nshape = { kind = \"sphere\", radius_m = 0.01 }\nposition_m = [101.0, 0.02, 0.0]\nmass_kg = 0.1\n";
+    let scene = format!(
+        "{ALL_SLOW}gravity_m_s2 = [0, 0, 0]\n[[finger]]\nstart_m = [0.0, 0.5, 0.0]\n{}{}{gone}",
+        plate("near", 101.0),
+        plate("far", 0.0)
+    );
+    let script = "at 1 move near to 101 0.2 0 in 0.5\nat 1.5 move far to 0.1 0 0 in 0.5";
+    let (ways, _) = ways(&scene, script, [0, 1], 6000);
+    assert_eq!(ways[5999], [101.0, 0.1]);
+}
+
 /// A thread of its own makes worlds where time does not wait, but for the first two.
 #[test]
 fn worlds_that_somebody_else_makes_come_in_the_order_of_the_script() {

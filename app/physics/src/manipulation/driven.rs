@@ -55,8 +55,9 @@ impl Manipulation {
     }
 
     /// How fast this entity may be driven on now, as a share of how fast it would be, 0 to 1: less than 1 where a body near it waits
-    /// for its turn in [`Self::step_at_most`]. Whoever drives several entities that belong together goes by the least of them.
-    pub fn pace_of_driven(&self, entity: usize) -> f64 {
+    /// for its turn in [`Self::step_at_most`], which then comes sooner. Whoever drives several entities that belong together goes by
+    /// the least of them.
+    pub fn pace_of_driven(&mut self, entity: usize) -> f64 {
         let pace = |body: usize| {
             let waits = self.standing(body) == Standing::Held;
             if waits { self.turns.pace_near(body) } else { 1.0 }
@@ -69,6 +70,7 @@ impl Manipulation {
             // Without an end it is near everything.
             None => least = (0..self.roster.bodies.len()).map(pace).fold(least, f64::min),
         }
+        self.turns.hurry |= least < 1.0;
         least
     }
 

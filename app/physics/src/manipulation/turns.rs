@@ -32,8 +32,8 @@ pub(super) struct Turns {
     held: Vec<u32>,
     /// Way that driven entities have gone in all ticks, of each tick the longest \[m\].
     driven_way_m: f64,
-    /// The same when turns changed \[m\].
-    changed_at_m: f64,
+    /// Something that is to be driven on waits for turns.
+    pub(super) hurry: bool,
     /// The same when a body began to wait, of each that does \[m\]; of the others infinite.
     held_at_m: Box<[f64]>,
     /// Entities that were driven while somebody waited.
@@ -55,7 +55,7 @@ impl Turns {
             near: Vec::with_capacity(MOST_NEAR),
             held: Vec::with_capacity(2 * bodies),
             driven_way_m: 0.0,
-            changed_at_m: 0.0,
+            hurry: false,
             held_at_m: vec![f64::INFINITY; bodies].into(),
             moved: Vec::with_capacity(2 * MAX_DRIVEN),
             all: Vec::with_capacity(bodies),
@@ -161,12 +161,11 @@ impl Manipulation {
         if !is_over && (self.turns.held.is_empty() || self.ticks < self.turns.change_at) {
             return;
         }
-        let is_driven_of_late = self.turns.driven_way_m > self.turns.changed_at_m;
-        self.turns.changed_at_m = self.turns.driven_way_m;
         // What is driven waits for all near it, wherever the fingers are.
-        self.turns.change_at = self.ticks + if is_driven_of_late { TURN_WHILE_DRIVEN } else { TURN };
+        let hurry = std::mem::take(&mut self.turns.hurry);
+        self.turns.change_at = self.ticks + if hurry { HURRIED_TURN } else { TURN };
         self.see_all(entities, touches);
-        self.choose(is_driven_of_late);
+        self.choose(hurry);
         self.change_turns(entities);
     }
 
@@ -278,8 +277,8 @@ impl Manipulation {
 
 /// Turns last so many ticks.
 const TURN: u64 = 16;
-/// And so many while something is driven, which waits for all near it to have one.
-const TURN_WHILE_DRIVEN: u64 = 4;
+/// And so many while something that is driven waits for all near it to have one.
+const HURRIED_TURN: u64 = 4;
 /// What is driven goes no farther than this, but for a tick, near who waits for its turn: less than contact points are
 /// [seen from](REACH_M) \[m\].
 const MOST_WAY_M: f64 = 0.5 * REACH_M;
