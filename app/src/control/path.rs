@@ -132,6 +132,7 @@ impl Path {
         self.was_parked |= matches!(self.stage, Stage::Waits) && step.is_parked(self.entity);
         let becomes_other = step.is_body(self.entity) && step.is_felt_at(self.entity);
         let place_W = self.stage.place_after(dt_s);
+        let is_left_alone = self.is_left_alone();
         match &mut self.stage {
             Stage::Waits if self.hold == Hold::TooMuch => Next::Undone,
             Stage::Goes { .. } if self.hold == Hold::TooMuch && dt_s == 0.0 => {
@@ -139,7 +140,7 @@ impl Path {
                 Next::Stopped
             }
             Stage::Waits if !is_clear || self.hold == Hold::Coming => Next::GoesOn,
-            Stage::Goes { .. } if self.is_left_alone() => Next::GoesOn,
+            Stage::Goes { .. } if is_left_alone => Next::GoesOn,
             Stage::Goes { .. } if dt_s == 0.0 => Next::GoesOn,
             Stage::Waits if becomes_other && !is_silent => Next::NeedsSilence,
             Stage::Waits => {
