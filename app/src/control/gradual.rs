@@ -7,7 +7,7 @@
 //! - Forces come and go with a world within [`FADE_S`]: in each tick by the tick's part of it.
 
 use super::order::{Move, Scale};
-use super::path::{MOST_PACE_PER_S, Next, Path};
+use super::path::{MOST_PACE_PER_S, Next, Path, Tick};
 use crate::fast_step::FastStep;
 pub use crate::fast_step::{FADE_S, MOST_SHARE};
 use physics::MAX_DRIVEN;
@@ -112,9 +112,10 @@ impl Gradual {
         let (is_clear, share) = looked;
         let wanted: f64 = if is_clear { 1.0 } else { 0.0 };
         *pace = wanted.clamp(*pace - MOST_PACE_PER_S * dt_s, *pace + MOST_PACE_PER_S * dt_s);
-        let most_s = pace.min(share) * dt_s;
+        let stops = *pace == 0.0 && paths.iter().any(Path::meets_too_much);
+        let tick = Tick { dt_s: pace.min(share) * dt_s, is_clear, stops, is_silent };
         paths.retain_mut(|path| {
-            let next = path.advance(step, most_s, is_clear, is_silent);
+            let next = path.advance(step, &tick);
             *needs_silence |= next == Next::NeedsSilence;
             *undone += u64::from(matches!(next, Next::Undone | Next::Stopped));
             !matches!(next, Next::Done | Next::Undone)

@@ -79,8 +79,21 @@ pub(super) enum Next {
     Done,
     /// Too much is near it.
     Undone,
-    /// Too much came near it on its way: it stands where it is, and is let go or goes where a newer order has it.
+    /// Too much came near it, or what is moved along, on its way: it stands where it is, and is let go or goes where a newer order has it.
     Stopped,
+}
+
+/// What holds in a tick for all that is moved.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Tick {
+    /// Time by which they go on (s): none while something that is here has to have its turn first.
+    pub(super) dt_s: f64,
+    /// None sets out before all of them [are clear](Path::look).
+    pub(super) is_clear: bool,
+    /// Their ways end here: one [meets too much](Path::meets_too_much), and what belongs together stays together.
+    pub(super) stops: bool,
+    /// No finger feels anything.
+    pub(super) is_silent: bool,
 }
 
 impl Path {
@@ -120,22 +133,21 @@ impl Path {
         self.waited_s > LONGEST_WAIT_S
     }
 
-    /// Goes on by so much time (s), none while something that is here has to have its turn first. None sets out before all of those
-    /// that are moved [are clear](Self::look).
-    pub(super) fn advance(
-        &mut self,
-        step: &mut FastStep,
-        dt_s: f64,
-        is_clear: bool,
-        is_silent: bool,
-    ) -> Next {
+    /// Whether more than can be called over is on its way.
+    pub(super) fn meets_too_much(&self) -> bool {
+        matches!(self.stage, Stage::Goes { .. }) && self.hold == Hold::TooMuch
+    }
+
+    /// A tick.
+    pub(super) fn advance(&mut self, step: &mut FastStep, tick: &Tick) -> Next {
+        let Tick { dt_s, is_clear, stops, is_silent } = *tick;
         self.was_parked |= matches!(self.stage, Stage::Waits) && step.is_parked(self.entity);
         let becomes_other = step.is_body(self.entity) && step.is_felt_at(self.entity);
         let place_W = self.stage.place_after(dt_s);
         let is_left_alone = self.is_left_alone();
         match &mut self.stage {
             Stage::Waits if self.hold == Hold::TooMuch => Next::Undone,
-            Stage::Goes { .. } if self.hold == Hold::TooMuch && dt_s == 0.0 => {
+            Stage::Goes { .. } if stops => {
                 self.stage = Stage::Ends;
                 Next::Stopped
             }

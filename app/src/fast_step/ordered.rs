@@ -84,7 +84,8 @@ impl FastStep {
 
     /// How fast this entity may go, as a share of how fast it would: less than 1 near what waits for its turn.
     pub fn pace_of_driven(&mut self, entity: usize) -> f64 {
-        self.objects.manipulation.pace_of_driven(entity)
+        // In a pause nobody has a turn.
+        if self.objects.is_paused { 1.0 } else { self.objects.manipulation.pace_of_driven(entity) }
     }
 
     /// In the next tick this entity goes to this pose; says whether it will.

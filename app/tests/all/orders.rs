@@ -534,11 +534,16 @@ fn a_plate_goes_over_hundreds_of_things_where_few_come_near_at_a_time() {
 fn where_too_much_comes_near_on_its_way_a_plate_stands_that_is_told_and_the_next_order_is_done() {
     // 70 in a row that it comes to all at once.
     let script = "at 0.1 move plate to 0 0.02 0 in 1\nat 3 move plate to -0.7 0.02 0 in 1";
-    let (ways, undone) = ways(&over_cubes([1, 70], [1.0, 0.02]), script, [1; 2], 6000);
+    // Another one is moved along, and stops with it.
+    let other = "[[entity]]\nname = \"other\"\nshape = { kind = \"box\", size_m = [0.1, 0.01, 0.1] }\nposition_m = [-0.6, 0.3, 0.0]\n";
+    let scene = over_cubes([1, 70], [1.0, 0.02]) + other;
+    let script = format!("{script}\nat 0.1 move other to 0 0.3 0 in 1");
+    let (ways, undone) = ways(&scene, &script, [1, 72], 6000);
+    assert!(ways[..3000].iter().all(|[plate, other]| plate == other), "they part");
     // Its edge is 0.2 m before it, what is soon up to 25 mm farther, what is near 20 mm and two boxes' 5 mm, and cubes are 10 mm.
     let stood = ways[2900][0];
     assert!(stood > -0.15 - 0.2 - 0.065 && stood < -0.15 - 0.2, "{stood}");
-    assert_eq!((undone, ways[5999][0]), (1, -0.7));
+    assert_eq!((undone, ways[5999][0]), (2, -0.7));
 }
 
 #[test]
