@@ -3,7 +3,7 @@
 //! Problem: a walk goes from face to face around a vertex. Where two of them cross it goes on below one of them. To try each
 //! pair of faces with a common vertex takes as long as all the rest of loading.
 //!
-//! Model: seen along the mean normal of its faces, a fan that goes once around, with all faces turned to whoever looks,
+//! Model: seen along the mean normal of its faces, by their angles, a fan that goes once around, with all faces turned to whoever looks,
 //! lies side by side: no two of its faces cross. How often it goes around tells the number of its sectors that hold one
 //! direction. Each pair is tried of all other fans: of rims, of what cannot be oriented, and of tips and saddles.
 //!
@@ -18,7 +18,7 @@ use super::crossed::MOST_PAIRS;
 /// What is known of the fan around a vertex.
 #[derive(Clone, Copy)]
 struct Fan {
-    /// Sum of the normals of its faces.
+    /// Sum of the normals of its faces, each by the chord of its angle: however many a cap is cut into, it counts as one.
     axis_B: Vector3<f64>,
     /// Sectors that hold one direction across the axis.
     around: u16,
@@ -31,7 +31,14 @@ impl Mesh {
     pub(super) fn has_crossed_fan(&self) -> bool {
         let mut fans = vec![Fan { axis_B: Vector3::zeros(), around: 0, is_open: false }; self.vertices.len()];
         for face in &self.faces {
-            face.vertices.iter().for_each(|&vertex| fans[vertex as usize].axis_B += face.normal_B);
+            let corners = self.triangles().corners(face);
+            let edges_B: [Vector3<f64>; 3] = std::array::from_fn(|edge| {
+                (corners[(edge + 1) % 3] - corners[edge]).try_normalize(0.0).unwrap_or_default()
+            });
+            for corner in 0..3 {
+                let chord = (edges_B[corner] + edges_B[(corner + 2) % 3]).norm();
+                fans[face.vertices[corner] as usize].axis_B += face.normal_B * chord;
+            }
         }
         for face in &self.faces {
             let corners = self.triangles().corners(face);

@@ -187,6 +187,27 @@ mod tests {
         all
     }
 
+    /// As programs for design write them: both caps cut into fans from a vertex of the rim.
+    #[test]
+    fn a_cylinder_of_thousands_of_sides_is_not_inverted_however_its_caps_are_cut() {
+        const SIDES: u32 = 6000;
+        let rim = |i: u32, y: f64| {
+            let (sin, cos) = (std::f64::consts::TAU * f64::from(i) / f64::from(SIDES)).sin_cos();
+            Vector3::new(0.05 * cos, y, 0.05 * sin)
+        };
+        let vertices = [-0.05, 0.05].into_iter().flat_map(|y| (0..SIDES).map(move |i| rim(i, y))).collect();
+        let mut faces = Vec::new();
+        for i in 0..SIDES {
+            let next = (i + 1) % SIDES;
+            faces.extend([[i, i + SIDES, next], [next, i + SIDES, next + SIDES]]);
+            if i > 0 && next > 0 {
+                faces.extend([[0, i, next], [SIDES, next + SIDES, i + SIDES]]);
+            }
+        }
+        let (mesh, _) = Mesh::build(TriangleSoup { vertices, faces }).unwrap();
+        assert!(!mesh.has_crossed_fan());
+    }
+
     #[test]
     fn the_answer_is_that_of_looking_at_each_pair() {
         let (mut yes, mut no) = (0, 0);
