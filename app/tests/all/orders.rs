@@ -537,7 +537,7 @@ fn where_too_much_comes_near_on_its_way_a_plate_stands_that_is_told_and_the_next
     // Another one is moved along, and stops with it.
     let other = "[[entity]]\nname = \"other\"\nshape = { kind = \"box\", size_m = [0.1, 0.01, 0.1] }\nposition_m = [-0.6, 0.3, 0.0]\n";
     let scene = over_cubes([1, 70], [1.0, 0.02]) + other;
-    let script = format!("{script}\nat 0.1 move other to 0 0.3 0 in 1");
+    let script = format!("at 0.1 move other to 0 0.3 0 in 1\n{script}");
     let (ways, undone) = ways(&scene, &script, [1, 72], 6000);
     assert!(ways[..3000].iter().all(|[plate, other]| plate == other), "they part");
     // Its edge is 0.2 m before it, what is soon up to 25 mm farther, what is near 20 mm and two boxes' 5 mm, and cubes are 10 mm.
@@ -560,20 +560,20 @@ fn what_is_moved_at_the_same_time_waits_together_and_stays_together() {
 
 #[test]
 fn what_waits_for_a_thing_that_never_comes_does_not_keep_others_waiting_for_ever() {
-    let plate = |name: &str, x: f64| {
+    let plate = |name: &str, at: &str| {
         let shape = "shape = { kind = \"box\", size_m = [0.1, 0.01, 0.1] }";
-        format!("[[entity]]\nname = \"{name}\"\n{shape}\nposition_m = [{x}, 0.0, 0.0]\n")
+        format!("[[entity]]\nname = \"{name}\"\n{shape}\nposition_m = {at}\n")
     };
     // It has left the world: the slow list keeps it where it is, for good.
-    let gone = "[[entity]]\nname = \"gone\"\nshape = { kind = \"sphere\", radius_m = 0.01 }\nposition_m = [101.0, 0.02, 0.0]\nmass_kg = 0.1\n";
+    let gone = "[[entity]]\nname = \"gone\"\nshape = { kind = \"sphere\", radius_m = 0.01 }\nposition_m = [60.0, 0.02, 80.1]\nmass_kg = 0.1\n";
     let scene = format!(
         "{ALL_SLOW}gravity_m_s2 = [0, 0, 0]\n[[finger]]\nstart_m = [0.0, 0.5, 0.0]\n{}{}{gone}",
-        plate("near", 101.0),
-        plate("far", 0.0)
+        plate("near", "[60.0, 0.0, 80.1]"),
+        plate("far", "[0.0, 0.0, 0.0]")
     );
-    let script = "at 1 move near to 101 0.2 0 in 0.5\nat 1.5 move far to 0.1 0 0 in 0.5";
+    let script = "at 1 move near to 60.1 0 80.1 in 0.5\nat 1.5 move far to 0.1 0 0 in 0.5";
     let (ways, _) = ways(&scene, script, [0, 1], 6000);
-    assert_eq!(ways[5999], [101.0, 0.1]);
+    assert_eq!(ways[5999], [60.0, 0.1]);
 }
 
 /// A thread of its own makes worlds where time does not wait, but for the first two.
