@@ -258,7 +258,7 @@ impl Manipulation {
         let Turns { all, is_chosen, held, held_at_m, driven_way_m, moved, .. } = turns;
         let who = who(roster, entities, *contacts);
         let resumes = |body: u32| is_chosen[body as usize] && held_at_m[body as usize] < *driven_way_m;
-        pairs.were_driven_among(moved, &resumes, &who);
+        pairs.were_driven_among(moved, resumes, &who);
         for &(_, body) in &*all {
             if resumes(body) {
                 pairs.meet(body as usize, &who, broad_phase, true);
