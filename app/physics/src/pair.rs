@@ -332,7 +332,7 @@ impl Pair {
         self.is_new = true;
     }
 
-    /// What is driven came nearer while the other one waited for its turn: that was worked for by who drives it.
+    /// Takes note that one was driven nearer while the other one waited for its turn: who drives it has worked for that.
     pub(crate) fn was_pushed(&mut self) {
         self.was_pushed = true;
     }

@@ -73,7 +73,7 @@ pub(crate) struct Key {
     /// An entity, which may be a body of a higher number.
     pub(crate) entity: u32,
     place: u32,
-    /// Whether they were near enough to touch in the last tick, or when the pair began if that was later.
+    /// True if they were near enough to touch in the last tick, or when the pair began if that was later.
     pub(crate) is_near: bool,
 }
 
@@ -508,7 +508,7 @@ impl Pairs {
 }
 
 /// Moves those keys out that go.
-/// How far a point of an entity went in the last tick, at most \[m\].
+/// Longest way of a point of an entity in the last tick \[m\].
 fn way_m(entity: &Entity) -> f64 {
     let (was, is) = (&entity.previous_X_WB, &entity.X_WB);
     let arm_m = bounding_ball(&entity.shape).map_or(0.0, |(middle, radius_m)| middle.norm() + radius_m);

@@ -23,7 +23,7 @@ pub struct Gradual {
     targets: Box<[[f64; 2]]>,
     is_scaling: bool,
     paths: Vec<Path>,
-    /// How fast all of them go, as a share of how fast they would.
+    /// Share of their speed with which all of them go.
     pace: f64,
     /// Whether somebody can only go on while no force is felt.
     needs_silence: bool,

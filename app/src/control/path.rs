@@ -15,7 +15,7 @@ use physics::collide::bounding_ball;
 pub const MOST_SPEED_M_S: f64 = 0.5;
 /// How much its speed changes at most \[m/s^2\].
 pub const MOST_ACCELERATION_M_S2: f64 = 5.0;
-/// How much the share of its speed with which it goes changes at most per time, where something has to come first \[1/s\]: from its
+/// Largest change per time of the share of its speed with which it goes, where something has to come first \[1/s\]: from its
 /// largest speed that is the largest acceleration, and it stands within the way for which it looks ahead.
 pub(super) const MOST_PACE_PER_S: f64 = MOST_ACCELERATION_M_S2 / MOST_SPEED_M_S;
 /// After so long a wait others that are moved at the time do not wait for it \[s\]: a thing that has left the world never comes.
@@ -29,7 +29,7 @@ pub(super) struct Path {
     pub(super) entity: usize,
     wanted: Move,
     stage: Stage,
-    /// What was [found](Self::look) in this tick.
+    /// Answer of [`Self::look`] in this tick.
     hold: Hold,
     /// For how long something has been on its way to here (s).
     waited_s: f64,
@@ -58,7 +58,7 @@ enum Stage {
 }
 
 impl Stage {
-    /// Where the entity is to be a tick (s) later; where it does not go anywhere the origin, for nobody.
+    /// Pose of the entity so much time (s) later; where it does not go anywhere the origin, for nobody.
     fn place_after(&self, dt_s: f64) -> Isometry3<f64> {
         match self {
             Self::Goes { from_W, to_W, over_s, passed_s } if passed_s + dt_s < *over_s => {
@@ -83,7 +83,7 @@ pub(super) enum Next {
     Stopped,
 }
 
-/// What holds in a tick for all that is moved.
+/// A tick, as it is for all that is moved.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Tick {
     /// Time by which they go on (s): none while something that is here has to have its turn first.
@@ -133,7 +133,7 @@ impl Path {
         self.waited_s > LONGEST_WAIT_S
     }
 
-    /// Whether more than can be called over is on its way.
+    /// True if more than can be called over is on its way.
     pub(super) fn meets_too_much(&self) -> bool {
         matches!(self.stage, Stage::Goes { .. }) && self.hold == Hold::TooMuch
     }

@@ -54,7 +54,7 @@ impl Manipulation {
         self.advance_driven(entities);
     }
 
-    /// How fast this entity may be driven on now, as a share of how fast it would be, 0 to 1: less than 1 where a body near it waits
+    /// Share of its speed with which this entity may be driven on now, 0 to 1: less than 1 where a body near it waits
     /// for its turn in [`Self::step_at_most`], which then comes sooner. Whoever drives several entities that belong together goes by
     /// the least of them.
     pub fn pace_of_driven(&mut self, entity: usize) -> f64 {

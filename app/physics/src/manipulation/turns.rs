@@ -92,7 +92,7 @@ impl Turns {
         self.driven_way_m += way_m;
     }
 
-    /// How fast what is driven may go near this body, which waits, as a share of how fast it would.
+    /// Share of its speed with which something may be driven on near this body, which waits.
     pub(super) fn pace_near(&self, body: usize) -> f64 {
         if self.driven_way_m - self.held_at_m[body] < MOST_WAY_M { SLOW } else { 0.0 }
     }
@@ -279,7 +279,7 @@ impl Manipulation {
 const TURN: u64 = 16;
 /// And so many while something that is driven waits for all near it to have one.
 const HURRIED_TURN: u64 = 4;
-/// What is driven goes no farther than this, but for a tick, near who waits for its turn: less than contact points are
+/// Longest way of something driven, but for a tick, near who waits for its turn: less than contact points are
 /// [seen from](REACH_M) \[m\].
 const MOST_WAY_M: f64 = 0.5 * REACH_M;
 /// Until then it goes so much more slowly than it would.
