@@ -264,9 +264,9 @@ fn an_island_that_comes_where_all_that_may_be_is_stepped_waits_and_is_told_to_ha
         let pose = Isometry3::translation(SIZE * f64::from(at), 0.5 * SIZE, 0.0);
         entities.push(object(Cuboid::new([SIZE; 3]).unwrap(), pose, 1000.0, 0.5));
     }
-    let side =
-        |are_here: bool| Side { entities: entities.clone(), manipulation: manipulation(&entities, are_here) };
-    let [mut one, mut other] = [side(true), side(false)];
+    let side = || Side { entities: entities.clone(), manipulation: manipulation(&entities, true) };
+    let [mut one, mut other] = [side(), side()];
+    (0..3).for_each(|body| other.manipulation.give_away(body, &other.entities));
     other.manipulation.step_at_most(1, std::iter::empty());
     other.manipulation.step(&mut other.entities, &mut [], DT);
     other.manipulation.forget_changes();
